@@ -1,0 +1,77 @@
+//! What every engine, GPU or CPU reference, offers to the renderer.
+
+use crate::film::Film;
+use crate::film::coverage::Rect;
+use std::ops::{AddAssign, Range};
+use std::sync::atomic::AtomicBool;
+
+/// The most pixels an engine is given at once; larger pictures are tiled.
+pub const MAX_TILE_PIXELS: u64 = 1 << 20;
+
+/// Makes samples.
+pub trait Engine {
+    /// Adds the samples numbered `samples` of every pixel of `rect` to `film`.
+    ///
+    /// `samples` lies within one [block](crate::film::BLOCK); the pixels of `rect`, at most
+    /// [`MAX_TILE_PIXELS`], have had the same samples so far, and none of these. When `stop` becomes
+    /// true the call may give up with [`EngineError::Stopped`]; on any error the film is as it was.
+    fn render(
+        &mut self,
+        film: &mut Film,
+        rect: Rect,
+        samples: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError>;
+
+    /// What it runs on.
+    fn device(&self) -> &DeviceInfo;
+}
+
+/// What a picture was made on.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct DeviceInfo {
+    /// The adapter's name, or the CPU reference's.
+    pub name: String,
+    /// Driver and version.
+    pub driver: String,
+    /// `gpu` or `cpu`: the `--backend` that chooses it.
+    pub backend: String,
+    /// Whether it is a software adapter.
+    pub software: bool,
+}
+
+/// Counts over a call or a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Camera paths: samples times pixels.
+    pub paths: u64,
+    /// Rays traced, shadow rays included.
+    pub rays: u64,
+    /// Paths cut at max_depth.
+    pub truncated: u64,
+    /// Samples left out because they were NaN or infinite.
+    pub nonfinite: u64,
+    /// Pixel x, y and number of the first of those.
+    pub first_nonfinite: Option<(u32, u32, u64)>,
+}
+
+impl AddAssign for Counters {
+    fn add_assign(&mut self, other: Self) {
+        self.paths += other.paths;
+        self.rays += other.rays;
+        self.truncated += other.truncated;
+        self.nonfinite += other.nonfinite;
+        self.first_nonfinite = self.first_nonfinite.or(other.first_nonfinite);
+    }
+}
+
+/// Why an engine gave up.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum EngineError {
+    /// `stop` was set.
+    #[error("stopped")]
+    Stopped,
+    /// The device was lost, ran out of memory, or misbehaved.
+    #[error("{0}")]
+    Device(String),
+}

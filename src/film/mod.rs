@@ -1,0 +1,381 @@
+//! The film: what has been measured so far, in f64, with what its error needs.
+//!
+//! Samples of a pixel are numbered from 0. A *round* is strata² consecutive samples, which visit each
+//! stratum once; round q belongs to *replicate* q mod [`REPLICATES`]. Rounds of one replicate may lean
+//! on each other (stratified, low-discrepancy), replicates never do: they are independent and
+//! identically distributed, so the spread of their means is the error of the whole, whatever the
+//! sampler. A GPU sums in f32 over *blocks* of [`BLOCK`] consecutive samples, a replicate each on its own;
+//! blocks are folded into f64 here. Neither boundary depends on how the work is cut.
+
+pub mod coverage;
+
+use crate::stats::luminance;
+use coverage::{Coverage, Rect};
+use std::ops::Range;
+
+/// Independent replicates in every film.
+pub const REPLICATES: usize = 4;
+
+/// Samples in a block, from one multiple of this number to the next.
+pub const BLOCK: u64 = 256;
+
+/// Sums of one replicate of one pixel: R, G, B and the square of each sample's luminance.
+pub type Sums<T> = [T; 4];
+
+/// Accumulated samples of a picture or of a part of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    /// Width and height of the whole picture in pixels.
+    pub size: [u32; 2],
+    /// The part of the picture that `sums` holds.
+    pub bounds: Rect,
+    /// Strata a side; fixes which replicate a sample belongs to.
+    pub strata: u32,
+    /// Which pixels have had which samples.
+    pub coverage: Coverage,
+    /// Finished blocks; rows of `bounds`, for every pixel its replicates.
+    sums: Vec<[Sums<f64>; REPLICATES]>,
+    /// Running f32 sums of unfinished blocks, in the same order; empty when there are none.
+    partial: Vec<[Sums<f32>; REPLICATES]>,
+}
+
+/// What a pixel says.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Estimate {
+    /// Mean radiance, linear RGB.
+    pub mean: [f64; 3],
+    /// Standard error of the mean of R, G, B, and of the luminance.
+    pub error: [f64; 4],
+    /// Samples it rests on.
+    pub samples: u64,
+    /// Independent replicates behind `error`; 0 or 1: see [`Film::estimate`].
+    pub replicates: u32,
+}
+
+impl Film {
+    /// An empty film for the part `bounds` of a picture of `size` pixels.
+    pub fn new(size: [u32; 2], bounds: Rect, strata: u32) -> Self {
+        let pixels = bounds.area() as usize;
+        Self {
+            size,
+            bounds,
+            strata,
+            coverage: Coverage::default(),
+            sums: vec![Default::default(); pixels],
+            partial: Vec::new(),
+        }
+    }
+
+    /// A film from its stored parts. `partial` is empty or as long as `sums`, which has an element for
+    /// every pixel of `bounds`.
+    pub fn from_parts(
+        size: [u32; 2],
+        bounds: Rect,
+        strata: u32,
+        coverage: Coverage,
+        sums: Vec<[Sums<f64>; REPLICATES]>,
+        partial: Vec<[Sums<f32>; REPLICATES]>,
+    ) -> Self {
+        assert_eq!(sums.len(), bounds.area() as usize);
+        assert!(partial.is_empty() || partial.len() == sums.len());
+        Self {
+            size,
+            bounds,
+            strata,
+            coverage,
+            sums,
+            partial,
+        }
+    }
+
+    /// Finished blocks, rows of `bounds`.
+    pub fn sums(&self) -> &[[Sums<f64>; REPLICATES]] {
+        &self.sums
+    }
+
+    /// Unfinished blocks, rows of `bounds`; empty when there are none.
+    pub fn partial(&self) -> &[[Sums<f32>; REPLICATES]] {
+        &self.partial
+    }
+
+    /// Position of pixel (x, y) of the picture in [`Film::sums`]; it must lie in `bounds`.
+    pub fn index(&self, x: u32, y: u32) -> usize {
+        debug_assert!(self.bounds.contains(x, y));
+        (y - self.bounds.y0) as usize * self.bounds.width() as usize + (x - self.bounds.x0) as usize
+    }
+
+    /// The running sums of pixel (x, y)'s unfinished block; zeros when none is begun.
+    pub fn partial_at(&self, x: u32, y: u32) -> [Sums<f32>; REPLICATES] {
+        if self.partial.is_empty() {
+            Default::default()
+        } else {
+            self.partial[self.index(x, y)]
+        }
+    }
+
+    /// Takes what a GPU has made of `samples`, which lie in one block, over `rect`: the running f32 sums
+    /// of that block for each pixel, row by row. They replace the running sums that the film had, and
+    /// are folded when `samples` ends the block.
+    pub fn put_block(
+        &mut self,
+        rect: Rect,
+        samples: Range<u64>,
+        running: impl Fn(u32, u32) -> [Sums<f32>; REPLICATES],
+    ) {
+        assert!(
+            samples.start < samples.end && samples.start / BLOCK == (samples.end - 1) / BLOCK,
+            "one block at a time"
+        );
+        let ends = samples.end % BLOCK == 0;
+        if !ends && self.partial.is_empty() {
+            self.partial = vec![Default::default(); self.sums.len()];
+        }
+        for y in rect.y0..rect.y1 {
+            for x in rect.x0..rect.x1 {
+                let i = self.index(x, y);
+                let new = running(x, y);
+                if ends {
+                    fold(&mut self.sums[i], &new);
+                    if !self.partial.is_empty() {
+                        self.partial[i] = Default::default();
+                    }
+                } else {
+                    self.partial[i] = new;
+                }
+            }
+        }
+        self.coverage.add(rect, samples);
+    }
+
+    /// Adds f64 samples directly, as the CPU reference makes them: for each pixel of `rect`, row by
+    /// row, `add` adds its samples to the pixel's sums, one after another.
+    pub fn put_samples(
+        &mut self,
+        rect: Rect,
+        samples: Range<u64>,
+        pixels: Vec<[Sums<f64>; REPLICATES]>,
+    ) {
+        assert_eq!(pixels.len(), rect.area() as usize);
+        for (k, new) in pixels.into_iter().enumerate() {
+            let (x, y) = (
+                rect.x0 + k as u32 % rect.width(),
+                rect.y0 + k as u32 / rect.width(),
+            );
+            let i = self.index(x, y);
+            self.sums[i] = new;
+        }
+        self.coverage.add(rect, samples);
+    }
+
+    /// Finished and unfinished sums of a pixel together.
+    pub fn total(&self, x: u32, y: u32) -> [Sums<f64>; REPLICATES] {
+        let i = self.index(x, y);
+        let mut total = self.sums[i];
+        if let Some(p) = self.partial.get(i) {
+            fold(&mut total, p);
+        }
+        total
+    }
+
+    /// What pixel (x, y) says, given its sample numbers (from [`Film::coverage`]).
+    ///
+    /// With R >= 2 replicates of n_r samples and mean m_r, the squared standard error of the mean m of all n
+    /// samples is Σ n_r (m_r - m)² / ((R - 1) n). With a single replicate the samples' own second moment
+    /// stands in: √(Σ Y²)/n for the luminance, shared among the channels in proportion to their
+    /// means. It is never too small on average (E Y² >= Var Y) and says so by `replicates` = 1.
+    pub fn estimate(&self, x: u32, y: u32, counts: &[u64; REPLICATES]) -> Estimate {
+        estimate(&self.total(x, y), counts)
+    }
+
+    /// Calls `f(x, y, estimate)` for every pixel of the film that has samples.
+    pub fn for_each(&self, mut f: impl FnMut(u32, u32, Estimate)) {
+        for (rect, ranges) in self.coverage.cells() {
+            let counts = replicate_counts(ranges, self.strata);
+            for y in rect.y0..rect.y1 {
+                for x in rect.x0..rect.x1 {
+                    f(x, y, self.estimate(x, y, &counts));
+                }
+            }
+        }
+    }
+
+    /// The picture's relative error, √ mean over pixels of s² / (Y² + (0.1 Ȳ)²), with s the standard error
+    /// of the luminance Y and Ȳ the picture's mean luminance; 0 for a black picture. `None` while
+    /// some pixel has fewer than two replicates: nothing is known then.
+    pub fn relative_error(&self) -> Option<f64> {
+        let (mut sum, mut n, mut known) = (0.0, 0u64, true);
+        self.for_each(|_, _, e| {
+            sum += luminance(e.mean);
+            n += 1;
+            known &= e.replicates >= 2;
+        });
+        if n == 0 || !known {
+            return None;
+        }
+        let floor = 0.1 * sum / n as f64;
+        if floor == 0.0 {
+            return Some(0.0);
+        }
+        let mut ratio = 0.0;
+        self.for_each(|_, _, e| {
+            ratio += e.error[3].powi(2) / (luminance(e.mean).powi(2) + floor * floor)
+        });
+        Some((ratio / n as f64).sqrt())
+    }
+
+    /// Mean luminance over the pixels that have samples; 0 if there are none.
+    pub fn mean_luminance(&self) -> f64 {
+        let (mut sum, mut n) = (0.0, 0u64);
+        self.for_each(|_, _, e| {
+            sum += luminance(e.mean);
+            n += 1;
+        });
+        if n == 0 { 0.0 } else { sum / n as f64 }
+    }
+
+    /// The smallest and largest number of replicates behind any pixel's error; (0, 0) for an empty film.
+    pub fn replicates(&self) -> (u32, u32) {
+        let of = |ranges| {
+            replicate_counts(ranges, self.strata)
+                .iter()
+                .filter(|&&n| n > 0)
+                .count() as u32
+        };
+        let all = || self.coverage.cells().map(|(_, ranges)| of(ranges));
+        (all().min().unwrap_or(0), all().max().unwrap_or(0))
+    }
+}
+
+fn fold(sums: &mut [Sums<f64>; REPLICATES], block: &[Sums<f32>; REPLICATES]) {
+    for (s, b) in sums.iter_mut().zip(block) {
+        for (s, b) in s.iter_mut().zip(b) {
+            *s += f64::from(*b);
+        }
+    }
+}
+
+fn estimate(sums: &[Sums<f64>; REPLICATES], counts: &[u64; REPLICATES]) -> Estimate {
+    let samples: u64 = counts.iter().sum();
+    if samples == 0 {
+        return Estimate::default();
+    }
+    let n = samples as f64;
+    let mean = [0, 1, 2].map(|c| sums.iter().map(|s| s[c]).sum::<f64>() / n);
+    let replicates = counts.iter().filter(|&&k| k > 0).count() as u32;
+    let mut error = [0.0; 4];
+    if replicates < 2 {
+        let second_moment = sums.iter().map(|s| s[3]).sum::<f64>();
+        let y = luminance(mean);
+        error[3] = second_moment.max(0.0).sqrt() / n;
+        for c in 0..3 {
+            error[c] = if y > 0.0 { error[3] * mean[c] / y } else { 0.0 };
+        }
+    } else {
+        let y = luminance(mean);
+        for (s, &k) in sums.iter().zip(counts) {
+            if k == 0 {
+                continue;
+            }
+            let k = k as f64;
+            for c in 0..3 {
+                error[c] += k * (s[c] / k - mean[c]).powi(2);
+            }
+            error[3] += k * (luminance([s[0] / k, s[1] / k, s[2] / k]) - y).powi(2);
+        }
+        for e in &mut error {
+            *e = (*e / (f64::from(replicates - 1) * n)).sqrt();
+        }
+    }
+    Estimate {
+        mean,
+        error,
+        samples,
+        replicates,
+    }
+}
+
+/// How many of the sample numbers in `ranges` fall to each replicate.
+pub fn replicate_counts(ranges: &[Range<u64>], strata: u32) -> [u64; REPLICATES] {
+    let round = u64::from(strata) * u64::from(strata);
+    std::array::from_fn(|r| {
+        ranges
+            .iter()
+            .map(|s| {
+                samples_before(s.end, r as u64, round) - samples_before(s.start, r as u64, round)
+            })
+            .sum()
+    })
+}
+
+/// How many samples numbered below `s` belong to replicate `r`; rounds have `round` samples.
+pub fn samples_before(s: u64, r: u64, round: u64) -> u64 {
+    let period = round * REPLICATES as u64;
+    let rest = s % period;
+    s / period * round + rest.saturating_sub(r * round).min(round)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_before_counts_every_sample_once() {
+        for round in [1, 4, 9] {
+            for s in 0..100u64 {
+                let expected: [u64; REPLICATES] = std::array::from_fn(|r| {
+                    (0..s)
+                        .filter(|k| (k / round) % REPLICATES as u64 == r as u64)
+                        .count() as u64
+                });
+                assert_eq!(
+                    std::array::from_fn(|r| samples_before(s, r as u64, round)),
+                    expected,
+                    "round {round}, s {s}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn stated_error_of_four_replicates_is_the_textbook_one() {
+        let sums = [
+            [1.0, 2.0, 3.0, 0.0],
+            [2.0, 2.0, 3.0, 0.0],
+            [3.0, 2.0, 3.0, 0.0],
+            [4.0, 2.0, 3.0, 0.0],
+        ];
+        let e = estimate(&sums, &[1; 4]);
+        assert_eq!(e.mean, [2.5, 2.0, 3.0]);
+        // Sample variance 5/3 of four values, over four.
+        assert!((e.error[0] - (5.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
+        assert_eq!(e.error[1], 0.0);
+        assert_eq!(e.replicates, 4);
+    }
+
+    #[test]
+    fn one_replicate_states_its_second_moment() {
+        let sums = [[1.0, 1.0, 1.0, 1.0], [0.0; 4], [0.0; 4], [0.0; 4]];
+        let e = estimate(&sums, &[1, 0, 0, 0]);
+        assert_eq!(e.replicates, 1);
+        assert!((e.error[3] - 1.0).abs() < 1e-12 && (e.error[0] - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_cut_block_equals_a_whole_one() {
+        let rect = Rect {
+            x0: 0,
+            y0: 0,
+            x1: 2,
+            y1: 1,
+        };
+        let mut whole = Film::new([2, 1], rect, 2);
+        let mut cut = whole.clone();
+        let done = [[0.3f32; 4]; REPLICATES];
+        whole.put_block(rect, 0..BLOCK, |_, _| done);
+        cut.put_block(rect, 0..10, |_, _| [[0.1f32; 4]; REPLICATES]);
+        assert_eq!(cut.partial_at(1, 0), [[0.1f32; 4]; REPLICATES]);
+        cut.put_block(rect, 10..BLOCK, |_, _| done);
+        assert_eq!(whole.sums(), cut.sums());
+        assert_eq!(whole.coverage, cut.coverage);
+    }
+}

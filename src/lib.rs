@@ -1,0 +1,17 @@
+//! etendue: a GPU path tracer for analytic scenes that says how wrong every picture still is.
+//!
+//! ```text
+//! scenes/x.toml -> scene::parse -> Scene -> World -> kernel::compose and gpu
+//!               -> dispatches -> Film (f64 on the host) -> pictures, report
+//! ```
+//!
+//! The CPU [`reference`] takes the same [`world::World`] and gives the same [`film::Film`].
+
+pub mod engine;
+pub mod film;
+pub mod output;
+pub mod reference;
+pub mod scene;
+pub mod settings;
+pub mod stats;
+pub mod world;

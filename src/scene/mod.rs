@@ -1,0 +1,184 @@
+//! The scene as its author wrote it: f64, the file's own units and order.
+//!
+//! [`parse`] reads it from TOML, [`check`] finds what is legal but suspect, and
+//! [`World::new`](crate::world::World::new) makes it ready for rays.
+
+pub mod check;
+pub mod parse;
+
+use glam::DVec3;
+use std::fmt;
+use std::path::PathBuf;
+
+/// A whole scene file. Every value has passed the format's rules.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// Where it was read from; empty for scenes made in memory.
+    pub path: PathBuf,
+    /// `title`, if the file has one.
+    pub title: Option<String>,
+    /// The pinhole camera.
+    pub camera: Camera,
+    /// `[render]`: what the file asks for; flags override it, [`Settings`](crate::settings::Settings) decides.
+    pub render: RenderHints,
+    /// Materials in the order of their names.
+    pub materials: Vec<Material>,
+    /// Primitives in the order spheres, planes, disks, cylinders, each in file order.
+    pub primitives: Vec<Primitive>,
+    /// Disk lights in file order; at least one.
+    pub lights: Vec<Light>,
+}
+
+/// Pinhole camera. `up` is not parallel to the view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Position of the pinhole.
+    pub eye: DVec3,
+    /// A point on the optical axis, different from `eye`.
+    pub look_at: DVec3,
+    /// Points to the picture's top; any length.
+    pub up: DVec3,
+    /// Vertical field of view in degrees, 0 < vfov < 180.
+    pub vfov: f64,
+    /// Width and height in pixels, each 1..=65536.
+    pub resolution: [u32; 2],
+}
+
+/// The optional `[render]` table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RenderHints {
+    /// Path vertices after the eye, >= 1.
+    pub max_depth: Option<u32>,
+    /// The pixel is divided into strata x strata cells, >= 1.
+    pub strata: Option<u32>,
+    /// Seed of every random number.
+    pub seed: Option<u32>,
+}
+
+/// A named material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// NAME of `[material.NAME]`.
+    pub name: String,
+    /// How it scatters.
+    pub bsdf: Bsdf,
+}
+
+/// Scattering models; colours are linear RGB, 0..=1 per channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bsdf {
+    /// Lambertian, f = reflectance / π.
+    Diffuse {
+        /// Hemispherical albedo.
+        reflectance: DVec3,
+    },
+    /// Perfect mirror.
+    Mirror {
+        /// Factor on the incoming radiance.
+        reflectance: DVec3,
+    },
+    /// Smooth boundary of a solid.
+    Dielectric {
+        /// Index inside divided by the index just outside, > 0.
+        ior: f64,
+        /// Tint, once per refraction.
+        transmittance: DVec3,
+    },
+    /// f = diffuse/π + specular (n+2)/(2π) cosⁿα (Lafortune & Willems 1994).
+    Phong {
+        /// kd.
+        diffuse: DVec3,
+        /// ks; kd + ks <= 1 per channel.
+        specular: DVec3,
+        /// n >= 0.
+        exponent: f64,
+    },
+}
+
+/// A surface with a material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Primitive {
+    /// Its geometry.
+    pub shape: Shape,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Line of its table in the file, from 1; 0 for scenes made in memory.
+    pub line: usize,
+}
+
+/// Analytic shapes. Normals have unit length.
+#[expect(missing_docs, reason = "the fields are the format's own keys")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// radius > 0.
+    Sphere { center: DVec3, radius: f64 },
+    /// Infinite; as a dielectric the solid is on the side that `normal` points away from.
+    Plane { point: DVec3, normal: DVec3 },
+    /// Flat and two-sided, radius > 0.
+    Disk {
+        center: DVec3,
+        normal: DVec3,
+        radius: f64,
+    },
+    /// Solid: side and two caps; base != top, radius > 0.
+    Cylinder {
+        base: DVec3,
+        top: DVec3,
+        radius: f64,
+    },
+}
+
+/// Disk luminaire: emits on its front, black and opaque otherwise, reflects nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Light {
+    /// Centre of the disk.
+    pub center: DVec3,
+    /// Unit normal of the side that emits.
+    pub normal: DVec3,
+    /// Radius > 0.
+    pub radius: f64,
+    /// Emitted radiance, the same in every direction of the front hemisphere.
+    pub radiance: DVec3,
+    /// Line of its table in the file, from 1; 0 for scenes made in memory.
+    pub line: usize,
+}
+
+impl Shape {
+    /// The format's word for it.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Shape::Sphere { .. } => "sphere",
+            Shape::Plane { .. } => "plane",
+            Shape::Disk { .. } => "disk",
+            Shape::Cylinder { .. } => "cylinder",
+        }
+    }
+}
+
+/// A message about one place in a scene file, printed as `path:line:column: message`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// The file.
+    pub path: PathBuf,
+    /// Line from 1; 0 when the message is about the whole file.
+    pub line: usize,
+    /// Column in characters from 1; 0 when the message is about a whole line.
+    pub column: usize,
+    /// What is wrong, the value found, and the rule.
+    pub message: String,
+}
+
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.path.display())?;
+        if self.line > 0 {
+            write!(f, ":{}", self.line)?;
+        }
+        if self.line > 0 && self.column > 0 {
+            write!(f, ":{}", self.column)?;
+        }
+        write!(f, ": {}", self.message)
+    }
+}
+
+impl std::error::Error for Diagnostic {}

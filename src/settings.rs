@@ -1,0 +1,102 @@
+//! Everything besides the scene that decides what is rendered: flags over the file's hints over defaults.
+
+use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+
+/// Path vertices after the eye when neither file nor flag says.
+pub const DEFAULT_MAX_DEPTH: u32 = 64;
+/// Strata a side when neither file nor flag says: the report's 2 x 2.
+pub const DEFAULT_STRATA: u32 = 2;
+
+/// How light travels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Integrator {
+    /// The whole of the rendering equation.
+    Path,
+    /// Mirrors and glass are followed, other surfaces take direct light only.
+    Whitted,
+}
+
+/// Which light is kept, by the number of scatterings between the lamp and the eye.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct LightParts {
+    /// Scattered nowhere.
+    pub emitted: bool,
+    /// Scattered exactly once.
+    pub direct: bool,
+    /// Scattered twice or more.
+    pub indirect: bool,
+}
+
+impl LightParts {
+    /// The whole picture.
+    pub const ALL: Self = Self {
+        emitted: true,
+        direct: true,
+        indirect: true,
+    };
+}
+
+/// Flags that override the scene's hints; `None` leaves the choice to scene or default.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Overrides {
+    /// `--size`: width and height in pixels.
+    pub size: Option<[u32; 2]>,
+    /// `--max-depth`.
+    pub max_depth: Option<u32>,
+    /// `--strata`.
+    pub strata: Option<u32>,
+    /// `--seed`.
+    pub seed: Option<u32>,
+    /// `--shadow-rays`.
+    pub shadow_rays: Option<u32>,
+    /// `--light`.
+    pub light: Option<LightParts>,
+    /// `--integrator`.
+    pub integrator: Option<Integrator>,
+}
+
+/// The resolved choices. Together with the scene they fix every sample's value.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Settings {
+    /// Width and height of the whole picture in pixels.
+    pub size: [u32; 2],
+    /// Path vertices after the eye, >= 1.
+    pub max_depth: u32,
+    /// Whether nobody chose `max_depth`: a cut path is then worth a warning.
+    pub max_depth_is_default: bool,
+    /// Pixel cells a side, >= 1.
+    pub strata: u32,
+    /// Seed of every random number.
+    pub seed: u32,
+    /// Light samples at every vertex, over all lights together, >= 1.
+    pub shadow_rays: u32,
+    /// Which light is kept.
+    pub light: LightParts,
+    /// How light travels.
+    pub integrator: Integrator,
+}
+
+impl Settings {
+    /// Flags first, then the scene's hints, then the defaults.
+    pub fn resolve(scene: &Scene, flags: &Overrides) -> Self {
+        let hints = &scene.render;
+        let max_depth = flags.max_depth.or(hints.max_depth);
+        Self {
+            size: flags.size.unwrap_or(scene.camera.resolution),
+            max_depth: max_depth.unwrap_or(DEFAULT_MAX_DEPTH),
+            max_depth_is_default: max_depth.is_none(),
+            strata: flags.strata.or(hints.strata).unwrap_or(DEFAULT_STRATA),
+            seed: flags.seed.or(hints.seed).unwrap_or(0),
+            shadow_rays: flags.shadow_rays.unwrap_or(1),
+            light: flags.light.unwrap_or(LightParts::ALL),
+            integrator: flags.integrator.unwrap_or(Integrator::Path),
+        }
+    }
+
+    /// Samples in one round, which visits every stratum once.
+    pub fn round(&self) -> u64 {
+        u64::from(self.strata) * u64::from(self.strata)
+    }
+}
