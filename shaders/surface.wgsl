@@ -1,0 +1,89 @@
+// What was met: the point put back on its surface, the normal, and the material.
+
+// One element per key / 4, lights first. A sphere is a cylinder without an axis, a plane has no radius.
+struct Surface {
+    // Centre, base, or (huge sphere) pole.
+    point: vec3f,
+    radius: f32,
+    // Normal of what is flat, axis of a cylinder, zero for spheres.
+    axis: vec3f,
+    // axis . p on the plane; of a cylinder's base.
+    offset: f32,
+    // Identities of the faces of parts 0, 1, 2.
+    faces: vec3u,
+    // Index into `materials`; lights have none.
+    material: u32,
+    // axis . p on a cylinder's top.
+    top: f32,
+    // The dielectric solid bounded, and the one around it.
+    solid: u32,
+    parent: u32,
+    // A SHAPE_ constant.
+    shape: u32,
+}
+
+// Scattering parameters; which of them mean something depends on `kind`, a MATERIAL_ constant.
+struct Material {
+    // Reflectance, transmittance, or kd.
+    color: vec3f,
+    kind: u32,
+    // ks.
+    specular: vec3f,
+    // Phong exponent, or index of refraction inside over outside.
+    exponent: f32,
+}
+
+struct Vertex {
+    // On the surface.
+    p: vec3f,
+    // Unit normal on the outside of a solid, the front of what is flat.
+    n: vec3f,
+    face: u32,
+}
+
+fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
+    let part = hit.key & 3u;
+    let p = ray.o + hit.t * ray.d;
+    var face = s.faces.x;
+#if ROUND
+    let m = p - s.point;
+#endif
+#if FLAT
+    // Onto the plane.
+    var offset = s.offset;
+#if CYLINDER
+    let top = part == 2u;
+    offset = select(s.offset, s.top, top);
+#endif
+    var v = Vertex(p - s.axis * (dot(s.axis, p) - offset), s.axis, face);
+#if CYLINDER
+    if s.shape == SHAPE_CYLINDER {
+        v.face = select(select(s.faces.x, s.faces.y, part == 1u), s.faces.z, top);
+        v.n = select(-s.axis, s.axis, top);
+    }
+#endif
+#endif
+#if ROUND
+    // Radially: from the centre of a sphere, from the axis of a cylinder.
+    let along = s.axis * dot(s.axis, m);
+    let n = normalize(m - along);
+    let round = Vertex(s.point + along + s.radius * n, n, s.faces.x);
+#if FLAT
+    if s.shape >= SHAPE_CYLINDER && part == 0u {
+        v = round;
+    }
+#else
+    var v = round;
+#endif
+#endif
+#if HUGE
+    if s.shape == SHAPE_HUGE_SPHERE {
+        // axis: the normal at the pole; offset: the curvature. Down along the normal by the height.
+        let w = p - s.point;
+        let normal = normalize(s.axis + s.offset * w);
+        let height = 0.5 * s.offset * dot(w, w) + dot(s.axis, w);
+        v = Vertex(p - normal * height, normal, s.faces.x);
+    }
+#endif
+    return v;
+}
