@@ -163,10 +163,11 @@ fn emission(path: Path, hit: Hit) -> vec3f {
 
 // Scatters the path where it met a surface: direct light, then a new direction. False when it ends.
 fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<function, vec4u>) -> bool {
-    let surface = surfaces[hit.key >> 2u];
-    let material = materials[surface.material];
+    let surface = surface_at(hit.key);
+    let material = material_at(surface.material);
     let d = (*path).ray.d;
     let v = vertex_at((*path).ray, hit, surface);
+    let face = face_at(hit.key, surface);
     // Two-sided: the normal on the side that the ray comes from.
     let outside = dot(v.n, d) < 0.0;
     let n = select(-v.n, v.n, outside);
@@ -223,7 +224,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
                 }
 #endif
                 (*count).x += 1u;
-                let shadow = Ray(v.p, to.d, v.face, (*path).ray.medium, chosen.light.face);
+                let shadow = Ray(v.p, to.d, face, (*path).ray.medium, chosen.light.face);
                 if !occluded(shadow, to.distance) {
                     gathered += f_cos * chosen.light.radiance * (1.0 / (pdf * SHADOW_RAYS));
                 }
@@ -303,7 +304,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
 
     let beta = (*path).beta * weight;
-    (*path).ray = Ray(v.p, next, v.face, medium, NO_FACE);
+    (*path).ray = Ray(v.p, next, face, medium, NO_FACE);
 #if MIS
 #if SEVERAL_LIGHTS
     (*path).n = n;

@@ -19,6 +19,19 @@ fn sphere_outside(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     return nearer(hit, disc >= 0.0 && b > 0.0 && ray.face != face, t, key);
 }
 
+// Whether sphere_outside would meet anything nearer than hit.t, without root or quotient: for shadow rays,
+// which need no distance. The entering root b - sqrt(disc) lies below t where b does, or where
+// disc > (b - t)^2.
+fn sphere_shadow(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
+    let f = ray.o - s.center;
+    let b = -dot(f, ray.d);
+    let l = f + b * ray.d;
+    let disc = s.radius * s.radius - dot(l, l);
+    let beyond = max(b - hit.t, 0.0);
+    let met = disc >= 0.0 && b > 0.0 && beyond * beyond <= disc && ray.face != face;
+    return Hit(hit.t, select(hit.key, key, met));
+}
+
 // The leaving root, for a ray known to be inside. From the sphere's own face the other root, 0, is
 // divided out.
 fn sphere_inside(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {

@@ -9,7 +9,7 @@ struct Surface {
     axis: vec3f,
     // axis . p on the plane; of a cylinder's base.
     offset: f32,
-    // Identities of the faces of parts 0, 1, 2.
+    // Identities of the faces of parts 0, 1, 2: the key of the first face in the same plane.
     faces: vec3u,
     // Index into `materials`; lights have none.
     material: u32,
@@ -20,6 +20,14 @@ struct Surface {
     parent: u32,
     // A SHAPE_ constant.
     shape: u32,
+}
+
+fn face_of(s: Surface, part: u32) -> u32 {
+#if CYLINDER
+    return select(select(s.faces.x, s.faces.y, part == 1u), s.faces.z, part == 2u);
+#else
+    return s.faces.x;
+#endif
 }
 
 // Scattering parameters; which of them mean something depends on `kind`, a MATERIAL_ constant.
@@ -38,36 +46,33 @@ struct Vertex {
     p: vec3f,
     // Unit normal on the outside of a solid, the front of what is flat.
     n: vec3f,
-    face: u32,
 }
 
 fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
     let part = hit.key & 3u;
     let p = ray.o + hit.t * ray.d;
-    var face = s.faces.x;
 #if ROUND
     let m = p - s.point;
 #endif
 #if FLAT
     // Onto the plane.
-    var offset = s.offset;
 #if CYLINDER
     let top = part == 2u;
-    offset = select(s.offset, s.top, top);
+    let offset = select(s.offset, s.top, top);
+#else
+    let offset = s.offset;
 #endif
-    var v = Vertex(p - s.axis * (dot(s.axis, p) - offset), s.axis, face);
+    var v = Vertex(p - s.axis * (dot(s.axis, p) - offset), s.axis);
 #if CYLINDER
-    if s.shape == SHAPE_CYLINDER {
-        v.face = select(select(s.faces.x, s.faces.y, part == 1u), s.faces.z, top);
-        v.n = select(-s.axis, s.axis, top);
-    }
+    // The base looks down the axis.
+    v.n = select(v.n, -v.n, part == 1u);
 #endif
 #endif
 #if ROUND
     // Radially: from the centre of a sphere, from the axis of a cylinder.
     let along = s.axis * dot(s.axis, m);
     let n = normalize(m - along);
-    let round = Vertex(s.point + along + s.radius * n, n, s.faces.x);
+    let round = Vertex(s.point + along + s.radius * n, n);
 #if FLAT
     if s.shape >= SHAPE_CYLINDER && part == 0u {
         v = round;
@@ -82,7 +87,7 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
         let w = p - s.point;
         let normal = normalize(s.axis + s.offset * w);
         let height = 0.5 * s.offset * dot(w, w) + dot(s.axis, w);
-        v = Vertex(p - normal * height, normal, s.faces.x);
+        v = Vertex(p - normal * height, normal);
     }
 #endif
     return v;

@@ -16,6 +16,7 @@
 
 use crate::scene::{Bsdf, Scene, Shape};
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// The medium outside every dielectric solid.
 pub const AIR: u32 = 0;
@@ -80,8 +81,8 @@ pub struct WorldPrimitive {
     pub solid: u32,
     /// The solid just outside `solid`.
     pub parent: u32,
-    /// Identity of its faces (cylinder: side, base cap, top cap; others use the first). Coincident
-    /// planar faces share one; never 0.
+    /// Identity of its faces (cylinder: side, base cap, top cap; others use the first): the [`key`] of
+    /// the face, or of the first of the planar faces that coincide.
     pub faces: [u32; 3],
     /// Line in the scene file.
     pub line: usize,
@@ -120,6 +121,11 @@ pub struct WorldCamera {
     pub dy: DVec3,
     /// The dielectric solid that holds the eye.
     pub medium: u32,
+}
+
+/// The key of part `part` of surface number `number`: lights come first, then the primitives.
+pub fn key(number: usize, part: usize) -> u32 {
+    (4 * number + part) as u32
 }
 
 /// The scene, ready for rays.
@@ -179,6 +185,7 @@ impl World {
         let medium = medium_at(&primitives, eye);
         scale_radiance(&mut lights, &primitives, &materials, medium);
         find_huge_spheres(&mut primitives, &lights, eye);
+        name_faces(&mut lights, &mut primitives);
 
         let forward = (scene.camera.look_at - scene.camera.eye).normalize();
         let right = forward.cross(scene.camera.up.normalize()).normalize();
@@ -628,6 +635,24 @@ fn scale_radiance(
         let n_light = index_of(primitives, materials, medium_at(primitives, before));
         if n_light != n_eye {
             l.radiance *= (n_eye / n_light).powi(2);
+        }
+    }
+}
+
+/// Replaces the identities of faces by the keys of those that are met first.
+fn name_faces(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
+    let mut names = HashMap::new();
+    let first = lights.len();
+    for (i, l) in lights.iter_mut().enumerate() {
+        l.face = *names.entry(l.face).or_insert(key(i, 0));
+    }
+    for (i, p) in primitives.iter_mut().enumerate() {
+        for part in 0..if matches!(p.geometry, Geometry::Cylinder { .. }) {
+            3
+        } else {
+            1
+        } {
+            p.faces[part] = *names.entry(p.faces[part]).or_insert(key(first + i, part));
         }
     }
 }

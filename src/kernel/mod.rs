@@ -5,6 +5,7 @@ mod literal;
 mod preprocess;
 mod rays;
 mod select;
+mod tables;
 
 pub use select::{Access, BAKED_LIMIT};
 

@@ -1,7 +1,7 @@
 //! Generated WGSL: `intersect`, `occluded`, `choose_light` and `light_at` of one scene.
 
-use super::Access;
 use super::literal::{float, vector};
+use super::{Access, tables};
 use crate::world::{COINCIDENT, Geometry, Side, World, WorldLight, WorldPrimitive};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -23,18 +23,17 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
         let mut blockers = everything;
         let hull = hull_faces(world);
         blockers.retain(|b| can_block(world, b, &hull));
+        for b in &mut blockers {
+            if b.function == "sphere_outside" {
+                b.function = "sphere_shadow";
+            }
+        }
         calls(&mut s, world, &blockers, access, false);
         s.push_str("    return hit.key != NONE;\n}\n\n");
         s.push_str(&light_choice(world, access));
     }
-    s.push_str("\nfn light_at(index: u32) -> DiskLight {\n");
-    match world.lights.as_slice() {
-        [only] => {
-            let _ = writeln!(s, "    return {};", light_literal(only));
-        }
-        _ => s.push_str("    return lights[index];\n"),
-    }
-    s.push_str("}\n");
+    s.push('\n');
+    s.push_str(&tables::generate(world, access));
     s
 }
 
@@ -230,7 +229,7 @@ fn buffer_call(function: &str) -> String {
         ),
         "plane_front" => ("Plane(s.axis, s.offset)", "s.faces.x, "),
         "plane_boundary" => ("Plane(s.axis, s.offset)", ""),
-        "sphere_outside" | "sphere_inside" | "sphere_boundary" => {
+        "sphere_outside" | "sphere_shadow" | "sphere_inside" | "sphere_boundary" => {
             ("Sphere(s.point, s.radius)", "s.faces.x, ")
         }
         _ => ("HugeSphere(s.point, s.offset, s.axis)", "s.faces.x, "),
@@ -315,7 +314,7 @@ fn light_in_cylinder(
         && out <= radius + slack
 }
 
-fn light_literal(l: &WorldLight) -> String {
+pub(super) fn light_literal(l: &WorldLight) -> String {
     format!(
         "DiskLight({}, {}, {}, {}, {}, {}u)",
         vector(l.center),
@@ -380,7 +379,7 @@ fn light_choice(world: &World, access: Access) -> String {
             s.push_str("        index = select(index, i, take);\n        chosen = select(chosen, w, take);\n    }\n");
         }
     }
-    s.push_str("    let light = lights[index];\n");
+    s.push_str("    let light = light_at(index);\n");
     s.push_str("    return Chosen(light, cap_of(light, p), chosen / max(sum, TINY), sum);\n}\n");
     s
 }
