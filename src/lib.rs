@@ -12,6 +12,7 @@ pub mod film;
 pub mod gpu;
 pub mod kernel;
 pub mod output;
+pub mod provenance;
 pub mod reference;
 pub mod scene;
 pub mod settings;
