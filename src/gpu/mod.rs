@@ -3,6 +3,7 @@
 mod adapters;
 mod engine;
 pub mod pack;
+pub mod probe;
 mod tile;
 
 pub use adapters::{AdapterReport, Choice, Gpu, adapters};

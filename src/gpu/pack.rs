@@ -190,3 +190,68 @@ pub fn pack(world: &World) -> Packed {
         lights,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::MODULES;
+    use std::mem::offset_of;
+
+    /// (struct, size, fields with their offsets) of the host.
+    macro_rules! layout {
+        ($($name:ident { $($field:ident),* $(,)? })*) => {
+            vec![$((stringify!($name), size_of::<$name>(), vec![$((stringify!($field), offset_of!($name, $field))),*])),*]
+        };
+    }
+
+    #[test]
+    fn host_structs_lie_as_the_kernel_reads_them() {
+        let host = layout! {
+            Surface { point, radius, axis, offset, faces, material, top, solid, parent, shape }
+            Material { color, kind, specular, exponent }
+            DiskLight { center, radius, normal, offset, radiance, face }
+            Params { tile, size, first, end, replicate, fresh, seed, groups, stride }
+        };
+        // Struct declarations are all that is needed, wherever they stand.
+        let mut text = String::new();
+        for (_, module) in MODULES
+            .iter()
+            .chain(&[("path", include_str!("../../shaders/path.wgsl"))])
+        {
+            for part in module.split("\nstruct ").skip(1) {
+                let body = part.split_once('}').expect("closed").0;
+                if host
+                    .iter()
+                    .any(|(name, ..)| body.starts_with(&format!("{name} {{")))
+                {
+                    text += &format!("struct {body}}}\n");
+                }
+            }
+        }
+        let module = naga::front::wgsl::parse_str(&text).expect("structs parse");
+        let mut layouter = naga::proc::Layouter::default();
+        layouter
+            .update(module.to_ctx())
+            .expect("structs have layouts");
+        for (name, size, fields) in host {
+            let (handle, ty) = module
+                .types
+                .iter()
+                .find(|(_, t)| t.name.as_deref() == Some(name))
+                .unwrap_or_else(|| panic!("no {name}"));
+            let naga::TypeInner::Struct { members, .. } = &ty.inner else {
+                panic!("{name} is a struct")
+            };
+            let shader: Vec<(&str, usize)> = members
+                .iter()
+                .map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize))
+                .collect();
+            assert_eq!(fields, shader, "{name}");
+            assert_eq!(
+                layouter[handle].to_stride() as usize,
+                size,
+                "stride of {name}"
+            );
+        }
+    }
+}

@@ -99,6 +99,7 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     let access = access.unwrap_or_else(|| Access::choose(world));
     let features = features(world, settings);
     let mut wgsl = String::from("// Made for one scene by etendue.\n\n");
+    tags(&mut wgsl);
     wgsl.push_str(&constants(world, settings));
     for (name, text) in MODULES {
         if needs(name, &features) {
@@ -138,6 +139,38 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
         wgsl,
         access,
         trips_per_sample,
+    }
+}
+
+/// A shader whose entry point `probe` runs `body` on 16 floats `x` into 16 floats `y`, beside all modules but the camera.
+pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
+    let features: BTreeSet<&str> = features.iter().copied().collect();
+    let mut s = String::new();
+    tags(&mut s);
+    for (name, text) in MODULES {
+        if name != "camera" {
+            s.push_str(&preprocess::run(text, &features));
+        }
+    }
+    s.push_str(
+        "@group(0) @binding(0) var<storage, read> inputs: array<array<f32, 16>>;\n\
+         @group(0) @binding(1) var<storage, read_write> outputs: array<array<f32, 16>>;\n\
+         @compute @workgroup_size(64)\n\
+         fn probe(@builtin(global_invocation_id) id: vec3u) {\n\
+             if id.x >= arrayLength(&inputs) { return; }\n\
+             let x = inputs[id.x];\n\
+             var y = outputs[id.x];\n",
+    );
+    s.push_str(body);
+    s.push_str("\n    outputs[id.x] = y;\n}\n");
+    s
+}
+
+fn tags(s: &mut String) {
+    for names in [&MATERIAL_TAGS[..], &SHAPE_TAGS[..]] {
+        for (tag, name) in names.iter().enumerate() {
+            let _ = writeln!(s, "const {name}: u32 = {tag}u;");
+        }
     }
 }
 
@@ -238,14 +271,6 @@ fn constants(world: &World, settings: &Settings) -> String {
     let [w, h] = settings.size.map(|n| float(f64::from(n) / 2.0));
     constant("CAMERA_CENTER", "vec2f", format!("vec2f({w}, {h})"));
     constant("CAMERA_MEDIUM", "u32", format!("{}u", c.medium));
-    for (tag, name) in MATERIAL_TAGS.iter().chain(&SHAPE_TAGS).enumerate() {
-        let tag = if tag < MATERIAL_TAGS.len() {
-            tag
-        } else {
-            tag - MATERIAL_TAGS.len()
-        };
-        constant(name, "u32", format!("{tag}u"));
-    }
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
     constant("REPLICATES", "u32", format!("{REPLICATES}u"));
