@@ -4,7 +4,11 @@
 //! [`World::new`](crate::world::World::new) makes it ready for rays.
 
 pub mod check;
+mod format;
 pub mod parse;
+pub mod schema;
+mod source;
+mod value;
 
 use glam::DVec3;
 use std::fmt;
