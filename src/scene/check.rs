@@ -7,6 +7,7 @@ mod geometry;
 mod lights;
 mod open;
 
+use super::source::quoted;
 use super::{Bsdf, Diagnostic, Primitive, Scene};
 use glam::DVec3;
 
@@ -20,8 +21,24 @@ pub const MAX_ALIKE: usize = 10;
 /// Surfaces closer than this, relative to their size, coincide.
 const COINCIDENT: f64 = crate::world::COINCIDENT;
 
-/// A warning: line in the scene file, 0 for the whole file, and message.
-type Warning = (usize, String);
+/// Warnings of one kind.
+#[derive(Default)]
+struct Warnings {
+    /// The first [`MAX_ALIKE`]: line in the scene file, 0 for the whole file, and message.
+    first: Vec<(usize, String)>,
+    /// How many there are besides.
+    more: usize,
+}
+
+impl Warnings {
+    fn add(&mut self, line: usize, message: impl FnOnce() -> String) {
+        if self.first.len() < MAX_ALIKE {
+            self.first.push((line, message()));
+        } else {
+            self.more += 1;
+        }
+    }
+}
 
 /// Warnings about what is legal but suspect, in no particular severity; empty for most scenes.
 ///
@@ -34,24 +51,26 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
         kinds.push(coincide::warnings(scene));
         kinds.push(cross::warnings(scene));
         kinds.push(lights::covered(scene));
+        kinds.push(lights::unseen(scene));
     } else {
-        let message = format!(
-            "{things} primitives and lights: with more than {MAX_PAIRWISE} they are not searched \
-             for surfaces that coincide or cross, or cover a light"
-        );
-        kinds.push(vec![(0, message)]);
+        let mut skipped = Warnings::default();
+        skipped.add(0, || {
+            format!(
+                "{things} primitives and lights: with more than {MAX_PAIRWISE} they are not \
+                 searched for surfaces that coincide or cross, or hide a light"
+            )
+        });
+        kinds.push(skipped);
     }
     kinds.push(lights::black(scene));
-    kinds.push(lights::unseen(scene));
     kinds.push(eye::warnings(scene));
     kinds.push(open::warnings(scene));
 
     let mut diagnostics = Vec::new();
-    for warnings in kinds {
-        let more = warnings.len().saturating_sub(MAX_ALIKE);
-        let first = warnings.into_iter().take(MAX_ALIKE);
+    for Warnings { first, more } in kinds {
         let counted = (more > 0).then(|| (0, format!("{more} more warnings like the last")));
-        diagnostics.extend(first.chain(counted).map(|(line, message)| Diagnostic {
+        let all = first.into_iter().chain(counted);
+        diagnostics.extend(all.map(|(line, message)| Diagnostic {
             path: scene.path.clone(),
             line,
             column: 0,
@@ -62,31 +81,25 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
 }
 
 /// Materials that do nothing.
-fn materials(scene: &Scene) -> Vec<Warning> {
+fn materials(scene: &Scene) -> Warnings {
     let mut users = vec![None; scene.materials.len()];
     for p in &scene.primitives {
         users[p.material].get_or_insert(p.line);
     }
-    let mut warnings = Vec::new();
+    let mut warnings = Warnings::default();
     for (material, user) in scene.materials.iter().zip(users) {
-        let name = &material.name;
+        let name = quoted(&material.name);
         match (user, material.bsdf) {
-            (None, _) => warnings.push((0, format!("material {name:?} is used by nothing"))),
-            (
-                Some(line),
-                Bsdf::Dielectric {
-                    ior: 1.0,
-                    transmittance,
-                },
-            ) => {
+            (None, _) => warnings.add(0, || format!("material {name} is used by nothing")),
+            (Some(line), Bsdf::Dielectric { ior, transmittance }) if ior == 1.0 => {
                 let effect = if transmittance == DVec3::ONE {
                     "is invisible"
                 } else {
                     "only tints"
                 };
-                let message =
-                    format!("material {name:?} has ior 1: it does not bend light and {effect}");
-                warnings.push((line, message));
+                warnings.add(line, || {
+                    format!("material {name} has ior 1: it does not bend light and {effect}")
+                });
             }
             _ => {}
         }

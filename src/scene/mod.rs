@@ -1,7 +1,7 @@
 //! The scene as its author wrote it: f64, the file's own units and order.
 //!
-//! [`parse`] reads it from TOML, [`check`] finds what is legal but suspect, and
-//! [`World::new`](crate::world::World::new) makes it ready for rays.
+//! [`parse`] reads it from TOML, [`schema`] describes that TOML to editors, [`check`] finds what is
+//! legal but suspect, and [`World::new`](crate::world::World::new) makes it ready for rays.
 
 pub mod check;
 mod format;

@@ -18,7 +18,7 @@ pub const MAX_FILE_BYTES: u64 = 64 << 20;
 
 /// Texts up to this many bytes have all their syntax errors reported, longer ones the first: a
 /// large file of something else can have one error a byte.
-const MAX_RECOVERED_BYTES: usize = 1 << 20;
+const MAX_RECOVERED_BYTES: usize = 1 << 16;
 
 /// Why there is no scene.
 #[derive(Debug, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! Surfaces that coincide. The format says which of them is met first, so that the picture is well
 //! defined; but unless it is a thing that rests on another, it is rarely meant.
 
-use super::{COINCIDENT, Warning, called, is_dielectric};
+use super::{COINCIDENT, Warnings, called, is_dielectric};
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
 
@@ -37,9 +37,9 @@ struct Thing {
 }
 
 /// One warning for every pair of things with suspect coincident surfaces.
-pub(super) fn warnings(scene: &Scene) -> Vec<Warning> {
+pub(super) fn warnings(scene: &Scene) -> Warnings {
     let things = things(scene);
-    let mut warnings = Vec::new();
+    let mut warnings = Warnings::default();
     for (i, a) in things.iter().enumerate() {
         for b in &things[i + 1..] {
             if let Some((rank_a, rank_b)) = suspect(a, b) {
@@ -47,12 +47,13 @@ pub(super) fn warnings(scene: &Scene) -> Vec<Warning> {
                 // between surfaces of equal rank.
                 let a_first = (rank_a, a.line) <= (rank_b, b.line);
                 let (first, second) = if a_first { (a, b) } else { (b, a) };
-                let message = format!(
-                    "{} coincides with {}, which is met first from either side",
-                    called(second.kind, second.line),
-                    called(first.kind, first.line),
-                );
-                warnings.push((second.line, message));
+                warnings.add(second.line, || {
+                    format!(
+                        "{} coincides with {}, which is met first from either side",
+                        called(second.kind, second.line),
+                        called(first.kind, first.line),
+                    )
+                });
             }
         }
     }
@@ -231,7 +232,7 @@ mod tests {
     const FLOOR: &str = "[[plane]]\npoint = [0,0,0]\nnormal = [0,1,0]\nmaterial = 'white'\n";
 
     fn suspect(text: &str) -> bool {
-        let found = super::warnings(&scene(text));
+        let found = super::warnings(&scene(text)).first;
         assert!(found.len() <= 1, "{found:?}");
         !found.is_empty()
     }
@@ -257,7 +258,7 @@ mod tests {
             "1e-9 apart, at no distance from the origin"
         );
         let text = text.replace("1e-9", "0");
-        let found = super::warnings(&scene(&text));
+        let found = super::warnings(&scene(&text)).first;
         let first = with("").lines().count() + 1;
         let expected = format!(
             "the plane at line {} coincides with the plane at line {first}, which is met first from either side",

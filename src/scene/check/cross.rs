@@ -2,25 +2,26 @@
 //! say. Solids may nest, touch, or be apart.
 
 use super::geometry::{farthest_on_cylinder, points_on_disk, signed_distance, size};
-use super::{COINCIDENT, Warning, called, is_dielectric};
+use super::{COINCIDENT, Warnings, called, is_dielectric};
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
 
 /// One warning for every pair of dielectric solids that cross.
-pub(super) fn warnings(scene: &Scene) -> Vec<Warning> {
+pub(super) fn warnings(scene: &Scene) -> Warnings {
     let primitives = scene.primitives.iter();
     let solids: Vec<_> = primitives.filter(|p| is_dielectric(scene, p)).collect();
-    let mut warnings = Vec::new();
+    let mut warnings = Warnings::default();
     for (i, a) in solids.iter().enumerate() {
         for b in &solids[i + 1..] {
             if cross(&a.shape, &b.shape) {
-                let message = format!(
-                    "{} crosses {}; both are dielectric, and what is inside both is undefined: \
+                warnings.add(b.line, || {
+                    format!(
+                        "{} crosses {}; both are dielectric, and what is inside both is undefined: \
                      nest them or keep them apart",
-                    called(b.shape.kind(), b.line),
-                    called(a.shape.kind(), a.line)
-                );
-                warnings.push((b.line, message));
+                        called(b.shape.kind(), b.line),
+                        called(a.shape.kind(), a.line)
+                    )
+                });
             }
         }
     }
@@ -147,12 +148,12 @@ mod tests {
     /// Whether two glass things are found to cross, in either order in the file.
     fn crossing(a: &str, b: &str) -> bool {
         let text = |a: &str, b: &str| format!("{a}\nmaterial = 'glass'\n{b}\nmaterial = 'glass'\n");
-        let found = super::warnings(&scene(&text(a, b)));
-        let other = super::warnings(&scene(&text(b, a)));
+        let found = super::warnings(&scene(&text(a, b))).first;
+        let other = super::warnings(&scene(&text(b, a))).first;
         assert_eq!(found.len(), other.len(), "{a} {b}");
         let opaque = format!("{a}\nmaterial = 'glass'\n{b}\nmaterial = 'white'\n");
         assert!(
-            super::warnings(&scene(&opaque)).is_empty(),
+            super::warnings(&scene(&opaque)).first.is_empty(),
             "opaque things may be inside"
         );
         found.len() == 1

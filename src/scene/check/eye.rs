@@ -1,43 +1,47 @@
 //! Where the eye is: in a solid, on a surface, on a light.
 
 use super::geometry::{disk_of, signed_distance, size};
-use super::{COINCIDENT, Warning, called};
+use super::{COINCIDENT, Warnings, called};
 use crate::scene::{Bsdf, Scene, Shape};
 
 /// Just before a light, in its radii: where its light begins.
 const BEFORE: f64 = 1e-3;
 
 /// Warnings about the eye's place.
-pub(super) fn warnings(scene: &Scene) -> Vec<Warning> {
+pub(super) fn warnings(scene: &Scene) -> Warnings {
     let eye = scene.camera.eye;
     let view = eye.distance(scene.camera.look_at);
     let touches =
         |shape: &Shape| signed_distance(shape, eye).abs() <= COINCIDENT * size(shape).min(view);
-    let mut warnings = Vec::new();
+    let mut warnings = Warnings::default();
     for l in scene.lights.iter().filter(|l| touches(&disk_of(l))) {
-        warnings.push((l.line, format!("the eye is on {}", called("light", l.line))));
+        warnings.add(l.line, || {
+            format!("the eye is on {}", called("light", l.line))
+        });
     }
     for p in &scene.primitives {
         let name = called(p.shape.kind(), p.line);
         let is_solid = !matches!(p.shape, Shape::Plane { .. });
         if touches(&p.shape) {
-            let message =
-                format!("the eye is on the surface of {name}: its side is a matter of rounding");
-            warnings.push((p.line, message));
+            warnings.add(p.line, || {
+                format!("the eye is on the surface of {name}: its side is a matter of rounding")
+            });
         } else if signed_distance(&p.shape, eye) >= 0.0 {
             continue;
         } else if let Bsdf::Dielectric { ior, .. } = scene.materials[p.material].bsdf {
-            let message = format!(
-                "the eye is inside {name}: what it sees from outside is {:.4} times as bright \
+            warnings.add(p.line, || {
+                format!(
+                    "the eye is inside {name}: what it sees from outside is {:.4} times as bright \
                  (ior squared)",
-                ior * ior
-            );
-            warnings.push((p.line, message));
+                    ior * ior
+                )
+            });
         } else if is_solid && !holds_light(scene, &p.shape) {
-            let message = format!(
-                "the eye is inside {name}, which is opaque and holds no light: it sees nothing"
-            );
-            warnings.push((p.line, message));
+            warnings.add(p.line, || {
+                format!(
+                    "the eye is inside {name}, which is opaque and holds no light: it sees nothing"
+                )
+            });
         }
     }
     warnings
@@ -57,7 +61,7 @@ mod tests {
 
     // The test scene's eye is at [0,1,4], and looks at [0,1,0]; its light is at [0,4,0].
     fn found(text: &str) -> bool {
-        !super::warnings(&scene(text)).is_empty()
+        !super::warnings(&scene(text)).first.is_empty()
     }
 
     fn ball(radius: f64, material: &str) -> String {

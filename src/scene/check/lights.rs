@@ -1,7 +1,7 @@
 //! Lights that give no light, as far as the picture is concerned.
 
 use super::geometry::{disk_of, hit, points_on_disk, signed_distance};
-use super::{COINCIDENT, Warning, called, is_dielectric};
+use super::{COINCIDENT, Warnings, called, is_dielectric};
 use crate::scene::{Light, Primitive, Scene, Shape};
 use glam::DVec3;
 
@@ -11,23 +11,23 @@ const COVER: f64 = 1e-3;
 const POINTS: usize = 64;
 
 /// Lights that emit nothing.
-pub(super) fn black(scene: &Scene) -> Vec<Warning> {
-    let black = scene.lights.iter().filter(|l| l.radiance == DVec3::ZERO);
-    let message = |l: &Light| {
+pub(super) fn black(scene: &Scene) -> Warnings {
+    let mut warnings = Warnings::default();
+    for l in scene.lights.iter().filter(|l| l.radiance == DVec3::ZERO) {
         let light = called("light", l.line);
-        (l.line, format!("{light} has radiance 0: a black disk"))
-    };
-    black.map(message).collect()
+        warnings.add(l.line, || format!("{light} has radiance 0: a black disk"));
+    }
+    warnings
 }
 
 /// Lights with something opaque right before half of their front or more.
-pub(super) fn covered(scene: &Scene) -> Vec<Warning> {
+pub(super) fn covered(scene: &Scene) -> Warnings {
     let opaque = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
     let primitives = opaque.map(|p| (p.shape, p.shape.kind(), p.line));
     let lights = scene.lights.iter().map(|l| (disk_of(l), "light", l.line));
     let covers: Vec<(Shape, &str, usize)> = primitives.chain(lights).collect();
 
-    let mut warnings = Vec::new();
+    let mut warnings = Warnings::default();
     for l in &scene.lights {
         // Off the light itself and off what it is flush on: whether that is before or behind is
         // no matter of distance.
@@ -47,24 +47,25 @@ pub(super) fn covered(scene: &Scene) -> Vec<Warning> {
         if let Some((_, kind, line)) = covers.iter().find(|c| is_covered(&c.0)) {
             let light = called("light", l.line);
             let cover = called(kind, *line);
-            let message = format!(
-                "{light} is covered: {cover} is before its front, within {COVER} of its radius"
-            );
-            warnings.push((l.line, message));
+            warnings.add(l.line, || {
+                format!(
+                    "{light} is covered: {cover} is before its front, within {COVER} of its radius"
+                )
+            });
         }
     }
     warnings
 }
 
 /// Lights whose front lies beyond an opaque plane, or within an opaque solid, that the eye does not.
-pub(super) fn unseen(scene: &Scene) -> Vec<Warning> {
+pub(super) fn unseen(scene: &Scene) -> Warnings {
     let eye = scene.camera.eye;
     let walls: Vec<&Primitive> = scene
         .primitives
         .iter()
         .filter(|p| !is_dielectric(scene, p))
         .collect();
-    let mut warnings = Vec::new();
+    let mut warnings = Warnings::default();
     for l in &scene.lights {
         let hidden = walls
             .iter()
@@ -72,8 +73,9 @@ pub(super) fn unseen(scene: &Scene) -> Vec<Warning> {
         if let Some((p, how)) = hidden {
             let light = called("light", l.line);
             let wall = called(p.shape.kind(), p.line);
-            let message = format!("{light} {how} {wall}, which is opaque: no light of it is seen");
-            warnings.push((l.line, message));
+            warnings.add(l.line, || {
+                format!("{light} {how} {wall}, which is opaque: no light of it is seen")
+            });
         }
     }
     warnings
@@ -135,14 +137,14 @@ fn faces_into_cap(shape: &Shape, l: &Light, slack: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{scene, warned};
-    use super::Warning;
+    use super::Warnings;
     use crate::scene::Scene;
 
     // The test scene's eye is at [0,1,4], and its light at [0,4,0] shines down.
     const BALL: &str = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'white'\n";
 
-    fn found(lint: fn(&Scene) -> Vec<Warning>, text: &str) -> bool {
-        !lint(&scene(text)).is_empty()
+    fn found(lint: fn(&Scene) -> Warnings, text: &str) -> bool {
+        !lint(&scene(text)).first.is_empty()
     }
 
     fn light(center: &str, normal: &str, radiance: &str) -> String {

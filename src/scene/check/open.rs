@@ -1,7 +1,7 @@
 //! Scenes that rays leave.
 
 use super::geometry::{directions, disk_of, hit};
-use super::{Warning, is_dielectric};
+use super::{Warnings, is_dielectric};
 use crate::scene::{Scene, Shape};
 
 /// Rays tried, evenly in all directions.
@@ -12,7 +12,7 @@ const WORK: usize = 20_000_000;
 const FEW_RAYS: usize = 20;
 
 /// Whether rays from the eye leave the scene. Dielectrics are looked straight through.
-pub(super) fn warnings(scene: &Scene) -> Vec<Warning> {
+pub(super) fn warnings(scene: &Scene) -> Warnings {
     let opaque = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
     let lights = scene.lights.iter().map(disk_of);
     let mut shapes: Vec<Shape> = opaque.map(|p| p.shape).chain(lights).collect();
@@ -24,14 +24,16 @@ pub(super) fn warnings(scene: &Scene) -> Vec<Warning> {
     let leaving = directions(rays)
         .filter(|&d| shapes.iter().all(|s| hit(s, eye, d).is_none()))
         .count();
-    if leaving == 0 {
-        return Vec::new();
+    let mut warnings = Warnings::default();
+    if leaving > 0 {
+        warnings.add(0, || {
+            format!(
+                "the scene is open: {leaving} of {rays} rays from the eye in all directions leave \
+                 it, and carry no light"
+            )
+        });
     }
-    let message = format!(
-        "the scene is open: {leaving} of {rays} rays from the eye in all directions leave it, and \
-         carry no light"
-    );
-    vec![(0, message)]
+    warnings
 }
 
 #[cfg(test)]
@@ -42,7 +44,7 @@ mod tests {
 
     #[test]
     fn a_floor_alone_is_open() {
-        let found = super::warnings(&scene(FLOOR));
+        let found = super::warnings(&scene(FLOOR)).first;
         let message = &found.first().expect("open").1;
         let leaving = message.split(' ').find_map(|word| word.parse::<f64>().ok());
         // Half of all directions go up, and the light hides two in a thousand.
