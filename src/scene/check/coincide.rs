@@ -135,7 +135,7 @@ fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
                 // One stands on the other; or they are parts of one thing.
                 (Rank::Cap, Rank::Cap) => {
                     let touch = opposite && !(a.dielectric && b.dielectric);
-                    touch || (alike && !same_disk(f, g))
+                    touch || alike
                 }
                 // A plane with something on it, or a half-space that something rests on.
                 (Rank::Cap, Rank::Plane) => {
@@ -332,6 +332,12 @@ mod tests {
             !suspect(&(low.clone() + &sheath.replace("white", "red"))),
             "one red thing"
         );
+        let band = cylinder("[0,0.2,0]", "[0,0.8,0]", 0.5, "white");
+        assert!(suspect(&(low.clone() + &band)), "sides coincide");
+        let below = cylinder("[0,-2,0]", "[0,-1,0]", 0.5, "white");
+        assert!(!suspect(&(low.clone() + &below)), "one above the other");
+        let above = cylinder("[0,2,0]", "[0,3,0]", 0.5, "white");
+        assert!(!suspect(&(low.clone() + &above)), "one above the other");
         let inlay = cylinder("[0,0.5,0]", "[0,1,0]", 0.2, "white");
         assert!(suspect(&(low + &inlay)), "caps flush");
         assert!(

@@ -257,6 +257,11 @@ mod tests {
             &rod("[0.123,-70,0]", "[0.123,60,0]", 0.01),
         );
         assert!(needles, "thin and long");
+        let aslant = crossing(
+            &rod("[-50,0,0.01]", "[51,0,0.01]", 0.01),
+            &rod("[-34.877,-70,0]", "[30.123,60,0]", 0.01),
+        );
+        assert!(aslant, "thin, long and not at right angles");
     }
 
     #[test]

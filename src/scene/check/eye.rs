@@ -78,6 +78,10 @@ mod tests {
         assert!(!found(&ball(0.5, "glass")));
         let behind = "[[plane]]\npoint = [0,0,0]\nnormal = [0,-1,0]\nmaterial = 'white'\n";
         assert!(!found(behind), "opaque planes are two-sided walls");
+        let between = behind
+            .replace("[0,0,0]", "[0,2,0]")
+            .replace("-1,0]", "1,0]");
+        assert!(!found(&between), "so is one before the light");
         assert!(
             found(&behind.replace("white", "glass")),
             "half-spaces of glass are solid"
