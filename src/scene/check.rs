@@ -91,7 +91,13 @@ fn materials(scene: &Scene) -> Warnings {
         let name = quoted(&material.name);
         match (user, material.bsdf) {
             (None, _) => warnings.add(0, || format!("material {name} is used by nothing")),
-            (Some(line), Bsdf::Dielectric { ior, transmittance }) if ior == 1.0 => {
+            (
+                Some(line),
+                Bsdf::Dielectric {
+                    ior: 1.0,
+                    transmittance,
+                },
+            ) => {
                 let effect = if transmittance == DVec3::ONE {
                     "is invisible"
                 } else {
