@@ -7,7 +7,7 @@ const TINY: f32 = 1.0e-30;
 // The key of no surface.
 const NONE: u32 = 0xffffffffu;
 // No face: the eye stands on nothing, and an ordinary ray aims at no light.
-const NO_FACE: u32 = 0xffffffffu;
+const NO_FACE: u32 = 0u;
 
 // A ray o + t d, |d| = 1, in world space. It stands on `face` (coincident planar faces share one),
 // is inside the dielectric solid `medium` (0: air), and, if it is a shadow ray, aims at the plane of

@@ -9,7 +9,7 @@ struct Surface {
     axis: vec3f,
     // axis . p on the plane; of a cylinder's base.
     offset: f32,
-    // Identities of the faces of parts 0, 1, 2: the key of the first face in the same plane.
+    // Identities of the faces of parts 0, 1, 2: 1 + the key of the first face in the same plane.
     faces: vec3u,
     // Index into `materials`; lights have none.
     material: u32,

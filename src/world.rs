@@ -81,8 +81,8 @@ pub struct WorldPrimitive {
     pub solid: u32,
     /// The solid just outside `solid`.
     pub parent: u32,
-    /// Identity of its faces (cylinder: side, base cap, top cap; others use the first): the [`key`] of
-    /// the face, or of the first of the planar faces that coincide.
+    /// Identity of its faces (cylinder: side, base cap, top cap; others use the first): [`face`] of
+    /// its key, or of the key of the first of the planar faces that coincide; never 0.
     pub faces: [u32; 3],
     /// Line in the scene file.
     pub line: usize,
@@ -128,6 +128,11 @@ pub struct WorldCamera {
 /// The key of part `part` of surface number `number`: lights come first, then the primitives.
 pub fn key(number: usize, part: usize) -> u32 {
     (4 * number + part) as u32
+}
+
+/// The identity of the face with this key, if nothing that is met earlier coincides with it; 0 is no face.
+pub fn face(key: u32) -> u32 {
+    key + 1
 }
 
 /// The scene, ready for rays.
@@ -647,7 +652,7 @@ fn name_faces(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
     let mut names = HashMap::new();
     let first = lights.len();
     for (i, l) in lights.iter_mut().enumerate() {
-        l.face = *names.entry(l.face).or_insert(key(i, 0));
+        l.face = *names.entry(l.face).or_insert(face(key(i, 0)));
     }
     for (i, p) in primitives.iter_mut().enumerate() {
         for part in 0..if matches!(p.geometry, Geometry::Cylinder { .. }) {
@@ -655,7 +660,7 @@ fn name_faces(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
         } else {
             1
         } {
-            p.faces[part] = *names.entry(p.faces[part]).or_insert(key(first + i, part));
+            p.faces[part] = *names.entry(p.faces[part]).or_insert(face(key(first + i, part)));
         }
     }
 }

@@ -7,7 +7,7 @@
 use super::literal::float;
 use super::{Access, material_tag, shape_tag};
 use crate::scene::Bsdf;
-use crate::world::{Geometry, World, WorldLight, WorldPrimitive, key};
+use crate::world::{Geometry, World, WorldLight, WorldPrimitive, face, key};
 use glam::DVec3;
 use std::fmt::Write as _;
 
@@ -183,8 +183,8 @@ fn baked(world: &World) -> String {
         &surfaces,
     ));
 
-    // A face is its own key, but for those that lie in the plane of an earlier one.
-    s.push_str("\nfn face_at(key: u32, s: Surface) -> u32 {\n    var face = key;\n");
+    // A face has its own identity, but for those that lie in the plane of an earlier one.
+    s.push_str("\nfn face_at(key: u32, s: Surface) -> u32 {\n    var face = key + 1u;\n");
     for (i, p) in world.primitives.iter().enumerate() {
         let parts = if matches!(p.geometry, Geometry::Cylinder { .. }) {
             3
@@ -193,7 +193,7 @@ fn baked(world: &World) -> String {
         };
         for part in 0..parts {
             let own = key(first + i, part);
-            if p.faces[part] != own {
+            if p.faces[part] != face(own) {
                 let _ = writeln!(
                     s,
                     "    face = select(face, {}u, key == {own}u);",
