@@ -501,7 +501,7 @@ fn settle_sides(primitives: &mut [WorldPrimitive], materials: &[Bsdf], eye: DVec
     }
 }
 
-/// A point well inside a solid, and its volume (half-spaces: the larger the further they reach).
+/// A point well inside a solid, and its volume.
 fn core_of(g: &Geometry) -> (DVec3, f64) {
     match *g {
         Geometry::Sphere { center, radius } => {
@@ -519,9 +519,28 @@ fn core_of(g: &Geometry) -> (DVec3, f64) {
                 radius * radius * length * std::f64::consts::PI,
             )
         }
-        Geometry::Plane { normal, offset } => (normal * (offset - 1e12), f64::INFINITY),
+        Geometry::Plane { normal, offset } => (normal * offset, f64::INFINITY),
         Geometry::HugeSphere { .. } | Geometry::Disk { .. } => (DVec3::ZERO, 0.0),
     }
+}
+
+/// Whether solid `outer` holds solid `inner`; of two equal ones the `first` in the file is the outer.
+fn encloses(outer: &Geometry, inner: &Geometry, first: bool) -> bool {
+    if let (
+        Geometry::Plane { normal, offset },
+        Geometry::Plane {
+            normal: n,
+            offset: o,
+        },
+    ) = (outer, inner)
+    {
+        // Half-spaces that are not parallel cross, and neither holds the other.
+        let parallel = normal.cross(*n).length() <= COINCIDENT && normal.dot(*n) > 0.0;
+        return parallel && (offset > o || (offset == o && first));
+    }
+    let (core, volume) = core_of(inner);
+    let larger = core_of(outer).1;
+    inside(outer, core) && (larger > volume || (larger == volume && first))
 }
 
 /// Numbers the dielectric solids from 1, and finds the one just outside each.
@@ -532,20 +551,18 @@ fn number_solids(primitives: &mut [WorldPrimitive], materials: &[Bsdf]) {
     for (k, &i) in solids.iter().enumerate() {
         primitives[i].solid = k as u32 + 1;
     }
+    let around: Vec<Vec<usize>> = (0..solids.len())
+        .map(|k| {
+            let inner = &primitives[solids[k]].geometry;
+            (0..solids.len())
+                .filter(|&m| m != k && encloses(&primitives[solids[m]].geometry, inner, m < k))
+                .collect()
+        })
+        .collect();
     for (k, &i) in solids.iter().enumerate() {
-        let (core, volume) = core_of(&primitives[i].geometry);
-        let around = solids.iter().enumerate().filter(|&(m, &j)| {
-            let other = core_of(&primitives[j].geometry).1;
-            // Of two equal solids the first in the file is met first: it is outside.
-            j != i
-                && inside(&primitives[j].geometry, core)
-                && (other > volume || (other == volume && m < k))
-        });
-        let smallest = around.min_by(|a, b| {
-            let v = |j: usize| core_of(&primitives[j].geometry).1;
-            v(*a.1).total_cmp(&v(*b.1)).then(b.0.cmp(&a.0))
-        });
-        primitives[i].parent = smallest.map_or(AIR, |(_, &j)| primitives[j].solid);
+        // Those around it lie in each other like the skins of an onion: the innermost has the most around it.
+        let innermost = around[k].iter().max_by_key(|&&m| around[m].len());
+        primitives[i].parent = innermost.map_or(AIR, |&m| primitives[solids[m]].solid);
     }
 }
 
