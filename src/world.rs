@@ -677,7 +677,9 @@ fn name_faces(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
         } else {
             1
         } {
-            p.faces[part] = *names.entry(p.faces[part]).or_insert(face(key(first + i, part)));
+            p.faces[part] = *names
+                .entry(p.faces[part])
+                .or_insert(face(key(first + i, part)));
         }
     }
 }
