@@ -13,6 +13,10 @@ use std::path::Path;
 /// and more than the other lossless codecs reach.
 const MOST_EXPANSION: u64 = 1032;
 
+/// Pictures up to this many bytes are read whatever the size of the file: black ones in lossy codecs
+/// can be smaller still, and this much memory does no harm.
+const HARMLESS: u64 = 64 << 20;
+
 /// Pixels a side: the scene format's limit.
 const MAX_SIDE: usize = 65536;
 
@@ -60,7 +64,7 @@ fn decode(mut from: impl Read + Seek, length: u64) -> exr::error::Result<Picture
                 size.0, size.1
             )));
         }
-        let most = length.saturating_mul(MOST_EXPANSION);
+        let most = length.saturating_mul(MOST_EXPANSION).max(HARMLESS);
         let bytes = (size.area() as u64).saturating_mul(header.channels.bytes_per_pixel as u64);
         if bytes > most {
             return Err(invalid(format!(

@@ -17,7 +17,6 @@ pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
     let s = &p.settings;
     let all = [
         ("software", text(&format!("{} {}", p.software, p.version))),
-        ("version", text(&p.version)),
         ("scene", p.scene_title.as_deref().and_then(text)),
         ("scene_hash", text(&p.scene_hash)),
         ("samples", number(p.samples as f64)),

@@ -300,7 +300,7 @@ mod tests {
                 });
             }),
             ("integrator", |_, f| {
-                f.integrator = Some(Integrator::Whitted)
+                f.integrator = Some(Integrator::Whitted);
             }),
             ("eye", |s, _| s.camera.eye.x = 1e-9),
             ("vfov", |s, _| s.camera.vfov = 40.000001),

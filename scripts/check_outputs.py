@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+"""Tells in JSON what readers that are not ours see in pictures and films.
+
+    pip install OpenEXR numpy pillow
+    python3 scripts/check_outputs.py picture.exr picture.png film.npz
+
+Prints one JSON object for each file, a line each. For every channel or array: type, shape, smallest
+and largest value, and all values of small ones. Exits 1, saying why, when a file can't be read.
+"""
+
+import json
+import sys
+import zipfile
+
+import numpy
+
+# Files with at most this many numbers in an array are shown whole.
+SHOW = 4096
+
+
+def describe(array):
+    """Type, shape, range and, of small arrays, the values."""
+    told = {"dtype": array.dtype.str, "shape": list(array.shape)}
+    if array.size and array.dtype.kind in "fiu":
+        told["min"] = array.min().item()
+        told["max"] = array.max().item()
+        told["finite"] = bool(numpy.isfinite(array).all())
+        if array.size <= SHOW:
+            told["values"] = array.tolist()
+    return told
+
+
+def plain(value):
+    """What JSON can hold of a header's value; text for the rest."""
+    if isinstance(value, (str, int, float, bool)):
+        return value
+    if isinstance(value, numpy.ndarray):
+        return value.tolist()
+    return str(value)
+
+
+def exr(path):
+    """Channels and attributes, by the reference implementation."""
+    import OpenEXR
+
+    with OpenEXR.File(path, separate_channels=True) as file:
+        if len(file.parts) != 1:
+            raise ValueError(f"{len(file.parts)} parts, not one")
+        window = file.header()["dataWindow"]
+        return {
+            "channels": {name: describe(c.pixels) for name, c in file.channels().items()},
+            "attributes": {k: plain(v) for k, v in file.header().items() if k != "channels"},
+            "size": [int(window[1][i] - window[0][i] + 1) for i in range(2)],
+        }
+
+
+def png(path):
+    """Pixels and text chunks, by Pillow."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        image.load()
+        return {
+            "mode": image.mode,
+            "size": list(image.size),
+            "pixels": describe(numpy.asarray(image)),
+            "text": {k: str(v) for k, v in image.text.items()},
+            "srgb": image.info.get("srgb"),
+        }
+
+
+def npz(path):
+    """Arrays by NumPy, checksums by Python's zipfile."""
+    with zipfile.ZipFile(path) as archive:
+        bad = archive.testzip()
+        if bad is not None:
+            raise ValueError(f"wrong checksum of {bad}")
+        compressed = any(i.compress_type != zipfile.ZIP_STORED for i in archive.infolist())
+    with numpy.load(path) as film:
+        arrays = {name: film[name] for name in film.files}
+    provenance = json.loads(arrays["provenance"].item())
+    return {
+        "arrays": {name: describe(array) for name, array in arrays.items()},
+        "provenance": provenance,
+        "compressed": compressed,
+    }
+
+
+READERS = {"exr": exr, "png": png, "npz": npz}
+
+
+def main(paths):
+    """Describes each file; returns the exit status."""
+    if not paths:
+        print(__doc__, file=sys.stderr)
+        return 2
+    for path in paths:
+        extension = path.rsplit(".", 1)[-1].lower()
+        try:
+            told = READERS[extension](path)
+        except KeyError:
+            print(f"{path}: not .exr, .png or .npz", file=sys.stderr)
+            return 2
+        except (OSError, ValueError, RuntimeError, zipfile.BadZipFile) as error:
+            print(f"{path}: {error}", file=sys.stderr)
+            return 1
+        print(json.dumps(told))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

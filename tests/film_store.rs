@@ -1,0 +1,330 @@
+//! Films on disk: nothing is lost, NumPy sees the same, and no damage gets past the loader.
+
+mod output_support;
+
+use etendue::film::coverage::Rect;
+use etendue::film::store::{load, save};
+use etendue::film::{Film, REPLICATES};
+use etendue::output::FileError;
+use etendue::provenance::Provenance;
+use output_support::{Random, described, region_film, render, seen_from_python, whole_film};
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn saved(dir: &Path, film: &Film) -> (PathBuf, Provenance) {
+    let path = dir.join("film.npz");
+    let provenance = described(film);
+    save(&path, film, &provenance).unwrap();
+    (path, provenance)
+}
+
+/// The error of loading `bytes`, which must be one of content.
+fn refused(path: &Path, bytes: &[u8]) -> String {
+    fs::write(path, bytes).unwrap();
+    let error = load(path).expect_err("a damaged film");
+    assert!(error.is_content(), "{error}");
+    let text = error.to_string();
+    assert!(!text.contains('\n') && text.starts_with(&path.display().to_string()));
+    text
+}
+
+#[test]
+fn a_film_comes_back_and_goes_on_with_the_same_bits() {
+    let dir = tempfile::tempdir().unwrap();
+    for film in [whole_film(), region_film()] {
+        let (path, provenance) = saved(dir.path(), &film);
+        let (mut back, back_provenance) = load(&path).unwrap();
+        assert_eq!(back_provenance, provenance);
+        assert_eq!(back, film);
+        let mut film = film;
+        let rest = Rect {
+            x0: 2,
+            y0: 2,
+            x1: 3,
+            y1: 3,
+        };
+        for f in [&mut back, &mut film] {
+            render(f, rest, 512..700);
+        }
+        assert_eq!(back, film);
+    }
+}
+
+#[test]
+fn saving_over_a_film_replaces_it_and_failing_to_leaves_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let (path, _) = saved(dir.path(), &region_film());
+    let film = whole_film();
+    saved(dir.path(), &film);
+    assert_eq!(load(&path).unwrap().0, film);
+    let nowhere = dir.path().join("none/film.npz");
+    let error = save(&nowhere, &film, &described(&film)).unwrap_err();
+    assert!(!error.is_content(), "{error}");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn numpy_sees_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    for (film, unfinished) in [(whole_film(), true), (region_film(), false)] {
+        let (path, provenance) = saved(dir.path(), &film);
+        let Some(seen) = seen_from_python(&path) else {
+            return;
+        };
+        let [w, h] = [film.bounds.width(), film.bounds.height()];
+        assert_eq!(seen["compressed"], json!(false));
+        let arrays = seen["arrays"].as_object().unwrap();
+        assert_eq!(arrays.contains_key("partial"), unfinished);
+        let told = &seen["provenance"];
+        assert_eq!(told["size"], json!([7, 5]));
+        assert_eq!(
+            told["provenance"],
+            serde_json::to_value(&provenance).unwrap()
+        );
+        assert_eq!(arrays["counts"]["dtype"], "<u8");
+        assert_eq!(arrays["sums"]["dtype"], "<f8");
+        assert_eq!(arrays["sums"]["shape"], json!([h, w, REPLICATES, 4]));
+        for y in 0..h {
+            for x in 0..w {
+                let i = film.index(film.bounds.x0 + x, film.bounds.y0 + y);
+                let at = |array: &str| &arrays[array]["values"][y as usize][x as usize];
+                assert_eq!(*at("sums"), json!(film.sums()[i]));
+                if unfinished {
+                    let expected = film.partial()[i].map(|s| s.map(f64::from));
+                    assert_eq!(*at("partial"), json!(expected));
+                    assert_eq!(*at("counts"), json!(300));
+                }
+            }
+        }
+        if !unfinished {
+            assert_eq!(
+                arrays["counts"]["values"],
+                json!([
+                    [256, 256, 256, 0, 0],
+                    [512, 512, 512, 256, 256],
+                    [512, 512, 512, 256, 256]
+                ])
+            );
+        }
+    }
+}
+
+#[test]
+fn every_flipped_bit_is_detected() {
+    let dir = tempfile::tempdir().unwrap();
+    let (path, _) = saved(dir.path(), &whole_film());
+    let good = fs::read(&path).unwrap();
+    let mut random = Random(1);
+    for _ in 0..1000 {
+        let mut bytes = good.clone();
+        let bit = random.below(8 * good.len() as u64);
+        bytes[(bit / 8) as usize] ^= 1 << (bit % 8);
+        refused(&path, &bytes);
+    }
+    // The parts that hold sizes and places more thoroughly.
+    let directory = good.len() - 400;
+    for bit in (0..8 * 200).chain(8 * directory..8 * good.len()).step_by(3) {
+        let mut bytes = good.clone();
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        refused(&path, &bytes);
+    }
+}
+
+#[test]
+fn every_truncation_is_detected() {
+    let dir = tempfile::tempdir().unwrap();
+    let (path, _) = saved(dir.path(), &region_film());
+    let good = fs::read(&path).unwrap();
+    let mut random = Random(2);
+    let ends = (0..100).chain(good.len() - 50..good.len());
+    for end in ends.chain((0..50).map(|_| random.below(good.len() as u64) as usize)) {
+        let text = refused(&path, &good[..end]);
+        assert!(text.contains("truncated"), "{text}");
+    }
+    let text = refused(&path, &[&good[..], b"x"].concat());
+    assert!(text.contains("after its end"), "{text}");
+}
+
+#[test]
+fn other_kinds_of_files_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("film.npz");
+    let zip = b"PK\x03\x04\x14\0\0\0\x08\0".repeat(50);
+    for bytes in [vec![0; 5000], b"title = \"x\"\n".repeat(100), zip] {
+        let text = refused(&path, &bytes);
+        assert!(text.contains("there is no \"provenance\""), "{text}");
+    }
+    for missing in [dir.path().join("none.npz"), dir.path().into()] {
+        let error = load(&missing).unwrap_err();
+        assert!(matches!(error, FileError::Io { .. }), "{error}");
+    }
+}
+
+/// Saves a film whose JSON says `to` where it said `from`, of the same length or shorter, with every
+/// checksum right: what a program gone wrong, not a disk, would leave.
+fn forged(dir: &Path, film: &Film, from: &str, to: &str) -> String {
+    let (path, _) = saved(dir, film);
+    let mut bytes = fs::read(&path).unwrap();
+    let find = |bytes: &[u8], what: &[u8]| {
+        bytes
+            .windows(what.len())
+            .position(|w| w == what)
+            .unwrap_or_else(|| panic!("{from} is not in the file"))
+    };
+    let padded = format!("{to:width$}", width = from.len());
+    let at = find(&bytes, from.as_bytes());
+    bytes[at..at + from.len()].copy_from_slice(padded.as_bytes());
+    reseal(&mut bytes);
+    refused(&path, &bytes)
+}
+
+/// Makes all checksums of the archive right again.
+fn reseal(bytes: &mut [u8]) {
+    let mut at = 0;
+    let mut sums = Vec::new();
+    while bytes[at..at + 4] == *b"PK\x03\x04" {
+        let name = usize::from(bytes[at + 26]);
+        let size_at = at + 30 + name + 4;
+        let size = u64::from_le_bytes(bytes[size_at..size_at + 8].try_into().unwrap()) as usize;
+        let data = size_at + 16;
+        let crc = crc32fast::hash(&bytes[data..data + size]).to_le_bytes();
+        bytes[at + 14..at + 18].copy_from_slice(&crc);
+        sums.push(crc);
+        at = data + size;
+    }
+    for crc in sums {
+        bytes[at + 16..at + 20].copy_from_slice(&crc);
+        at += 46 + usize::from(bytes[at + 28]) + 28;
+    }
+}
+
+#[test]
+fn inconsistent_films_are_refused_saying_why() {
+    let dir = tempfile::tempdir().unwrap();
+    let film = region_film();
+    for (from, to, expected) in [
+        (
+            "etendue film",
+            "etendue tape",
+            "its format is \"etendue tape\"",
+        ),
+        (
+            "\"format_version\":1",
+            "\"format_version\":2",
+            "its format version is 2; this program reads version 1",
+        ),
+        (
+            "\"size\":[7,5]",
+            "\"size\":[0,5]",
+            "size 0x5: a side has 1 to 65536",
+        ),
+        (
+            "\"size\":[7,5]",
+            "\"size\":[5,5]",
+            "do not lie in the picture",
+        ),
+        (
+            "\"size\":[7,5]",
+            "\"size\":[7,6]",
+            "contradict its provenance",
+        ),
+        ("\"strata\":2", "\"strata\":3", "contradict its provenance"),
+        ("\"block\":256", "\"block\":128", "blocks of 128 samples"),
+        ("\"replicates\":4", "\"replicates\":8", "8 replicates"),
+        ("\"x1\":6", "\"x1\":5", "does not lie in the film"),
+        (
+            "\"start\":0,\"end\":256",
+            "\"start\":0,\"end\":255",
+            "counts 256 samples",
+        ),
+        (
+            "\"start\":0,\"end\":256",
+            "\"start\":9,\"end\":9",
+            "sample ranges [9..9]",
+        ),
+        (
+            "\"start\":0,\"end\":256",
+            "\"start\":-1,\"end\":25",
+            "provenance is wrong",
+        ),
+        ("\"coverage\":", "\"coverbge\":", "missing field `coverage`"),
+    ] {
+        let text = forged(dir.path(), &film, from, to);
+        assert!(text.contains(expected), "{from} -> {to}: {text}");
+    }
+}
+
+#[test]
+fn bad_numbers_are_refused_with_their_pixel() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut film = whole_film();
+    let with = |i: usize, c: usize, x: f64| {
+        let mut sums = film.sums().to_vec();
+        sums[i][1][c] = x;
+        let parts = (film.coverage.clone(), film.partial().to_vec());
+        Film::from_parts(film.size, film.bounds, 2, parts.0, sums, parts.1)
+    };
+    for (film, expected) in [
+        (with(8, 0, f64::NAN), "pixel (1, 1): \"sums\" holds NaN"),
+        (
+            with(0, 2, f64::INFINITY),
+            "pixel (0, 0): \"sums\" holds inf",
+        ),
+        (
+            with(34, 3, -1.0),
+            "pixel (6, 4): \"sums\" holds -1, a negative",
+        ),
+    ] {
+        let (path, _) = saved(dir.path(), &film);
+        let text = refused(&path, &fs::read(&path).unwrap());
+        assert!(text.contains(expected), "{text}");
+    }
+    let rect = Rect::whole(film.size);
+    film.put_block(rect, 300..301, |x, _| {
+        [[if x == 6 { f32::NAN } else { 1.0 }; 4]; REPLICATES]
+    });
+    let (path, _) = saved(dir.path(), &film);
+    let text = refused(&path, &fs::read(&path).unwrap());
+    assert!(
+        text.contains("pixel (6, 0): \"partial\" holds NaN"),
+        "{text}"
+    );
+
+    // A negative count: the first pixel's made -1 in place.
+    let (path, _) = saved(dir.path(), &whole_film());
+    let mut bytes = fs::read(&path).unwrap();
+    let count = 300u64.to_le_bytes().repeat(3);
+    let at = bytes.windows(24).position(|w| w == count).unwrap();
+    bytes[at..at + 8].copy_from_slice(&(-1i64).to_le_bytes());
+    reseal(&mut bytes);
+    let text = refused(&path, &bytes);
+    assert!(text.contains("pixel (0, 0) counts -1 samples"), "{text}");
+}
+
+#[test]
+fn a_small_file_that_claims_to_be_huge_is_refused_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    // 65536 x 65536 pixels would take 550 GB.
+    let film = region_film();
+    let mut provenance = described(&film);
+    provenance.settings.size = [65536, 65536];
+    let huge = Film::from_parts(
+        [65536, 65536],
+        film.bounds,
+        2,
+        film.coverage.clone(),
+        film.sums().to_vec(),
+        vec![],
+    );
+    let path = dir.path().join("film.npz");
+    save(&path, &huge, &provenance).unwrap();
+    assert_eq!(load(&path).unwrap().0, huge);
+    let mut bytes = fs::read(&path).unwrap();
+    let json = b"\"x1\":6,\"y1\":4";
+    let at = bytes.windows(json.len()).position(|w| w == json).unwrap();
+    bytes[at + 5] = b'7';
+    reseal(&mut bytes);
+    let text = refused(&path, &bytes);
+    assert!(text.contains("array \"counts\" has"), "{text}");
+}
