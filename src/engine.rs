@@ -41,7 +41,7 @@ pub struct DeviceInfo {
 }
 
 /// Counts over a call or a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Counters {
     /// Camera paths: samples times pixels.
     pub paths: u64,

@@ -10,6 +10,7 @@
 pub mod engine;
 pub mod film;
 pub mod output;
+pub mod provenance;
 pub mod reference;
 pub mod scene;
 pub mod settings;

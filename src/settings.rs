@@ -58,7 +58,7 @@ pub struct Overrides {
 }
 
 /// The resolved choices. Together with the scene they fix every sample's value.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Settings {
     /// Width and height of the whole picture in pixels.
     pub size: [u32; 2],

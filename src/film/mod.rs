@@ -8,6 +8,9 @@
 //! blocks are folded into f64 here. Neither boundary depends on how the work is cut.
 
 pub mod coverage;
+pub mod merge;
+mod npz;
+pub mod store;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};

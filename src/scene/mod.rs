@@ -4,6 +4,7 @@
 //! [`World::new`](crate::world::World::new) makes it ready for rays.
 
 pub mod check;
+pub mod hash;
 pub mod parse;
 
 use glam::DVec3;

@@ -1,0 +1,320 @@
+//! `.npz` archives: what `numpy.load` opens, of arrays that are stored and not compressed.
+//!
+//! An archive is a ZIP file of `.npy` members. Here its every byte follows from names, types, shapes
+//! and contents: no clock, no options, ZIP64 records always, so that there is one form for every
+//! size. The reader therefore compares rather than interprets, and no flipped bit gets past it.
+//!
+//! Sources: PKWARE APPNOTE.TXT 6.3.10, sections 4.3.7 to 4.3.16 and 4.5.3; NumPy NEP 1 (format 1.0).
+
+use std::io::{self, Read, Write};
+
+// Numbers are copied as they lie in memory, and stand in the file with the lowest byte first.
+const _: () = assert!(cfg!(target_endian = "little"));
+
+/// Version 4.5 of the ZIP format: the first with ZIP64.
+const ZIP_VERSION: u16 = 45;
+/// Made on Unix (upper byte), so that the permission bits below count.
+const MADE_BY: u16 = 3 << 8 | ZIP_VERSION;
+const PERMISSIONS: u32 = 0o100_644 << 16;
+/// 1980-01-01, the first day a ZIP file can name.
+const DATE: u16 = 1 << 5 | 1;
+/// "See the ZIP64 record".
+const SEE_64: u32 = u32::MAX;
+/// Bytes of a local header before the name.
+const LOCAL_FIXED: usize = 30;
+
+/// An array to be written.
+pub struct Array<'a> {
+    /// Key in the archive.
+    pub name: &'static str,
+    /// NumPy's type: `<f8`, `|S12`.
+    pub descr: String,
+    /// Lengths; empty for a single item.
+    pub shape: Vec<u64>,
+    /// The items, last index fastest.
+    pub data: &'a [u8],
+}
+
+/// Why an archive could not be read.
+#[derive(Debug)]
+pub enum Damage {
+    /// Reading failed, or the file ends too early ([`io::ErrorKind::UnexpectedEof`]).
+    Io(io::Error),
+    /// It is not what it should be.
+    Wrong(String),
+}
+
+impl From<io::Error> for Damage {
+    fn from(e: io::Error) -> Self {
+        Self::Io(e)
+    }
+}
+
+/// What the directory at the end says of a member.
+struct Member {
+    name: &'static str,
+    crc32: u32,
+    size: u64,
+    offset: u64,
+}
+
+/// Writes the arrays as one archive.
+pub fn write(mut to: impl Write, arrays: &[Array]) -> io::Result<()> {
+    let mut members = Vec::new();
+    let mut offset = 0;
+    for array in arrays {
+        let npy = npy_header(&array.descr, &array.shape);
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(&npy);
+        crc.update(array.data);
+        let member = Member {
+            name: array.name,
+            crc32: crc.finalize(),
+            size: (npy.len() + array.data.len()) as u64,
+            offset,
+        };
+        let local = local_header(member.name, member.crc32, member.size);
+        to.write_all(&local)?;
+        to.write_all(&npy)?;
+        to.write_all(array.data)?;
+        offset += local.len() as u64 + member.size;
+        members.push(member);
+    }
+    to.write_all(&directory(&members, offset))
+}
+
+/// Reads an archive of known arrays in known order.
+pub struct Reader<R> {
+    from: R,
+    /// Bytes of the whole file; bounds every allocation.
+    length: u64,
+    at: u64,
+    members: Vec<Member>,
+}
+
+impl<R: Read> Reader<R> {
+    /// `length`: how many bytes `from` holds.
+    pub fn new(from: R, length: u64) -> Self {
+        Self {
+            from,
+            length,
+            at: 0,
+            members: Vec::new(),
+        }
+    }
+
+    /// The next member, a single string of bytes of any length (NumPy's `|S`).
+    pub fn string(&mut self, name: &'static str) -> Result<Vec<u8>, Damage> {
+        let (crc32, size) = self.local(name)?;
+        let mut data = self.allocate::<u8>(size)?;
+        self.from.read_exact(&mut data)?;
+        // The header is padded: its length is the same for any number of digits.
+        let length = size.saturating_sub(npy_header("|S1", &[]).len() as u64);
+        let npy = npy_header(&format!("|S{length}"), &[]);
+        if !data.starts_with(&npy) {
+            return Err(Damage::Wrong(format!("\"{name}\" is not a string")));
+        }
+        check_crc(name, crc32, &[&data])?;
+        self.passed(name, crc32, size);
+        data.drain(..npy.len());
+        Ok(data)
+    }
+
+    /// The next member, an array of `items` whose type and shape NumPy calls `descr` and `shape`.
+    pub fn array<T: bytemuck::Pod>(
+        &mut self,
+        name: &'static str,
+        descr: &str,
+        shape: &[u64],
+        items: u64,
+    ) -> Result<Vec<T>, Damage> {
+        let (crc32, size) = self.local(name)?;
+        let expected = npy_header(descr, shape);
+        let bytes = items.saturating_mul(size_of::<T>() as u64);
+        if size != bytes.saturating_add(expected.len() as u64) {
+            return Err(Damage::Wrong(format!(
+                "array \"{name}\" has {size} bytes, not those of type {descr} and shape {shape:?}"
+            )));
+        }
+        let mut npy = vec![0; expected.len()];
+        self.from.read_exact(&mut npy)?;
+        if npy != expected {
+            return Err(Damage::Wrong(format!(
+                "array \"{name}\" is not of type {descr} and shape {shape:?}"
+            )));
+        }
+        let mut data = self.allocate::<T>(items)?;
+        let view: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
+        self.from.read_exact(view)?;
+        check_crc(name, crc32, &[&npy, view])?;
+        self.passed(name, crc32, size);
+        Ok(data)
+    }
+
+    /// The end of the archive: nothing but the directory of what was read.
+    pub fn finish(mut self) -> Result<(), Damage> {
+        let expected = directory(&self.members, self.at);
+        let mut found = vec![0; expected.len()];
+        self.from.read_exact(&mut found)?;
+        if found != expected {
+            return Err(Damage::Wrong("its directory is wrong".into()));
+        }
+        if self.from.read(&mut [0])? != 0 {
+            return Err(Damage::Wrong("it has bytes after its end".into()));
+        }
+        Ok(())
+    }
+
+    /// Reads a local header; returns CRC and size of what follows.
+    fn local(&mut self, name: &'static str) -> Result<(u32, u64), Damage> {
+        let mut found = vec![0; local_header(name, 0, 0).len()];
+        self.from.read_exact(&mut found)?;
+        let crc32 = u32::from_le_bytes(found[14..18].try_into().expect("four bytes"));
+        let end = found.len();
+        let size = u64::from_le_bytes(found[end - 8..].try_into().expect("eight bytes"));
+        if found != local_header(name, crc32, size) {
+            let stored = &found[LOCAL_FIXED..LOCAL_FIXED + name.len()];
+            return Err(Damage::Wrong(if stored == name.as_bytes() {
+                format!("the header of \"{name}\" is wrong")
+            } else {
+                format!("there is no \"{name}\" where it should be")
+            }));
+        }
+        if size > self.length {
+            return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+        }
+        Ok((crc32, size))
+    }
+
+    fn passed(&mut self, name: &'static str, crc32: u32, size: u64) {
+        let offset = self.at;
+        self.at += local_header(name, crc32, size).len() as u64 + size;
+        self.members.push(Member {
+            name,
+            crc32,
+            size,
+            offset,
+        });
+    }
+
+    /// Zeros to read into; at most as many bytes as the file has.
+    fn allocate<T: bytemuck::Pod>(&self, items: u64) -> Result<Vec<T>, Damage> {
+        if items.saturating_mul(size_of::<T>() as u64) > self.length {
+            return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+        }
+        let mut data = Vec::new();
+        let items = items as usize;
+        data.try_reserve_exact(items)
+            .map_err(|_| Damage::Io(io::ErrorKind::OutOfMemory.into()))?;
+        data.resize(items, T::zeroed());
+        Ok(data)
+    }
+}
+
+fn check_crc(name: &str, expected: u32, parts: &[&[u8]]) -> Result<(), Damage> {
+    let mut crc = crc32fast::Hasher::new();
+    parts.iter().for_each(|p| crc.update(p));
+    if crc.finalize() == expected {
+        Ok(())
+    } else {
+        Err(Damage::Wrong(format!(
+            "the content of \"{name}\" does not match its checksum"
+        )))
+    }
+}
+
+/// Header of a `.npy` file of format 1.0, padded to 64 bytes as NumPy pads it.
+fn npy_header(descr: &str, shape: &[u64]) -> Vec<u8> {
+    let shape = match shape {
+        [one] => format!("({one},)"),
+        many => {
+            let all: Vec<String> = many.iter().map(u64::to_string).collect();
+            format!("({})", all.join(", "))
+        }
+    };
+    let dict = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
+    let total = (10 + dict.len() + 1).next_multiple_of(64);
+    let mut header = b"\x93NUMPY\x01\x00".to_vec();
+    header.extend(((total - 10) as u16).to_le_bytes());
+    header.extend(dict.bytes());
+    header.resize(total - 1, b' ');
+    header.push(b'\n');
+    header
+}
+
+/// Local file header (4.3.7) of `NAME.npy`, the ZIP64 field (4.5.3) included.
+fn local_header(name: &str, crc32: u32, size: u64) -> Vec<u8> {
+    let name = format!("{name}.npy");
+    let mut h = Vec::new();
+    h.extend(0x0403_4b50_u32.to_le_bytes());
+    for x in [ZIP_VERSION, 0, 0, 0, DATE] {
+        h.extend(x.to_le_bytes());
+    }
+    for x in [crc32, SEE_64, SEE_64] {
+        h.extend(x.to_le_bytes());
+    }
+    for x in [name.len() as u16, 20] {
+        h.extend(x.to_le_bytes());
+    }
+    debug_assert_eq!(h.len(), LOCAL_FIXED);
+    h.extend(name.bytes());
+    for x in [1_u16, 16] {
+        h.extend(x.to_le_bytes());
+    }
+    for x in [size, size] {
+        h.extend(x.to_le_bytes());
+    }
+    h
+}
+
+/// Central directory (4.3.12), which begins at byte `start`, and the three records that end the file
+/// (4.3.14 to 4.3.16).
+fn directory(members: &[Member], start: u64) -> Vec<u8> {
+    let mut d = Vec::new();
+    for m in members {
+        let name = format!("{}.npy", m.name);
+        d.extend(0x0201_4b50_u32.to_le_bytes());
+        for x in [MADE_BY, ZIP_VERSION, 0, 0, 0, DATE] {
+            d.extend(x.to_le_bytes());
+        }
+        for x in [m.crc32, SEE_64, SEE_64] {
+            d.extend(x.to_le_bytes());
+        }
+        for x in [name.len() as u16, 28, 0, 0, 0] {
+            d.extend(x.to_le_bytes());
+        }
+        for x in [PERMISSIONS, SEE_64] {
+            d.extend(x.to_le_bytes());
+        }
+        d.extend(name.bytes());
+        for x in [1_u16, 24] {
+            d.extend(x.to_le_bytes());
+        }
+        for x in [m.size, m.size, m.offset] {
+            d.extend(x.to_le_bytes());
+        }
+    }
+    let (count, length) = (members.len() as u64, d.len() as u64);
+    d.extend(0x0606_4b50_u32.to_le_bytes());
+    d.extend(44_u64.to_le_bytes());
+    for x in [MADE_BY, ZIP_VERSION] {
+        d.extend(x.to_le_bytes());
+    }
+    d.extend([0; 8]);
+    for x in [count, count, length, start] {
+        d.extend(x.to_le_bytes());
+    }
+    d.extend(0x0706_4b50_u32.to_le_bytes());
+    d.extend(0_u32.to_le_bytes());
+    d.extend((start + length).to_le_bytes());
+    d.extend(1_u32.to_le_bytes());
+    d.extend(0x0605_4b50_u32.to_le_bytes());
+    for x in [0, 0, u16::MAX, u16::MAX] {
+        d.extend(x.to_le_bytes());
+    }
+    for x in [SEE_64, SEE_64] {
+        d.extend(x.to_le_bytes());
+    }
+    d.extend(0_u16.to_le_bytes());
+    d
+}

@@ -1,0 +1,276 @@
+//! Films on disk: an `.npz` archive that `numpy.load` opens.
+//!
+//! | array | type, shape | holds |
+//! |---|---|---|
+//! | `provenance` | `\|S`, one item | JSON: format and its version, size, bounds, coverage, [`Provenance`] |
+//! | `counts` | u64 (h, w) | samples of each pixel |
+//! | `sums` | f64 (h, w, 4 replicates, 4) | R, G, B, and luminance², over finished blocks |
+//! | `partial` | f32 (h, w, 4 replicates, 4) | the same over an unfinished block; only there while one is |
+//!
+//! h and w are those of `bounds`. In Python:
+//! `f = numpy.load("x.npz"); json.loads(f["provenance"].item())`, and a pixel's mean is
+//! `f["sums"].sum(2)[..., :3] / f["counts"][..., None]` when no block is unfinished.
+
+use super::coverage::{Coverage, Rect};
+use super::npz::{self, Array, Damage, Reader};
+use super::{BLOCK, Film, REPLICATES, Sums};
+use crate::output::atomic;
+use crate::output::error::{FileError, open};
+use crate::provenance::Provenance;
+use serde::{Deserialize, Serialize};
+use std::io::BufReader;
+use std::ops::Range;
+use std::path::Path;
+
+/// Version of the format that this program writes, and the only one that it reads.
+pub const FORMAT_VERSION: u32 = 1;
+
+const FORMAT: &str = "etendue film";
+
+/// Pixels a side of a picture: the scene format's limit.
+const MAX_SIDE: u32 = 65536;
+
+/// What the member `provenance` says. Its first two keys are [`Kind`]'s.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    format: String,
+    format_version: u32,
+    size: [u32; 2],
+    bounds: Rect,
+    strata: u32,
+    replicates: usize,
+    block: u64,
+    partial: bool,
+    coverage: Coverage,
+    provenance: Provenance,
+}
+
+/// As much of [`Header`] as every version has.
+#[derive(Deserialize)]
+struct Kind {
+    format: String,
+    format_version: u32,
+}
+
+/// Saves a film: the file is whole or as it was.
+pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), FileError> {
+    let unfinished = film.partial().iter().flatten().flatten().any(|&x| x != 0.0);
+    let header = Header {
+        format: FORMAT.into(),
+        format_version: FORMAT_VERSION,
+        size: film.size,
+        bounds: film.bounds,
+        strata: film.strata,
+        replicates: REPLICATES,
+        block: BLOCK,
+        partial: unfinished,
+        coverage: film.coverage.clone(),
+        provenance: provenance.clone(),
+    };
+    let json = serde_json::to_vec(&header).map_err(|e| {
+        FileError::content(
+            path,
+            format!("its provenance can't be written as JSON: {e}"),
+        )
+    })?;
+    let counts = counts(&film.coverage, film.bounds)
+        .map_err(|e| FileError::content(path, format!("inconsistent film: {e}")))?;
+    let [height, width] = [film.bounds.height(), film.bounds.width()].map(u64::from);
+    let per_replicate = vec![height, width, REPLICATES as u64, 4];
+    let mut arrays = vec![
+        Array {
+            name: "provenance",
+            descr: format!("|S{}", json.len()),
+            shape: vec![],
+            data: &json,
+        },
+        Array {
+            name: "counts",
+            descr: "<u8".into(),
+            shape: vec![height, width],
+            data: bytemuck::cast_slice(&counts),
+        },
+        Array {
+            name: "sums",
+            descr: "<f8".into(),
+            shape: per_replicate.clone(),
+            data: bytemuck::cast_slice(film.sums()),
+        },
+    ];
+    if unfinished {
+        arrays.push(Array {
+            name: "partial",
+            descr: "<f4".into(),
+            shape: per_replicate,
+            data: bytemuck::cast_slice(film.partial()),
+        });
+    }
+    atomic::replace(path, |file| npz::write(file, &arrays))
+}
+
+/// Loads a film. Whatever is wrong with the file is an error of its content, found before it can do harm.
+pub fn load(path: &Path) -> Result<(Film, Provenance), FileError> {
+    let file = open(path)?;
+    let length = file
+        .metadata()
+        .map_err(|e| FileError::io(path, "cannot read", &e))?
+        .len();
+    let reader = Reader::new(BufReader::with_capacity(1 << 18, file), length);
+    read(reader).map_err(|damage| match damage {
+        Damage::Io(e) if e.kind() == std::io::ErrorKind::OutOfMemory => FileError::Io {
+            path: path.into(),
+            message: format!("cannot read: not enough memory for a film of {length} bytes"),
+        },
+        Damage::Io(e) => FileError::reading(path, &e),
+        Damage::Wrong(what) => FileError::content(path, format!("no usable film: {what}")),
+    })
+}
+
+fn read<R: std::io::Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
+    let wrong = |what: String| Err(Damage::Wrong(what));
+    let json = reader.string("provenance")?;
+    let not_json = |e: serde_json::Error| Damage::Wrong(format!("its provenance is wrong: {e}"));
+    let kind: Kind = serde_json::from_slice(&json).map_err(not_json)?;
+    if kind.format != FORMAT {
+        return wrong(format!("its format is {:?}, not {FORMAT:?}", kind.format));
+    }
+    if kind.format_version != FORMAT_VERSION {
+        return wrong(format!(
+            "its format version is {}; this program reads version {FORMAT_VERSION}",
+            kind.format_version
+        ));
+    }
+    let header: Header = serde_json::from_slice(&json).map_err(not_json)?;
+    check_header(&header).map_err(Damage::Wrong)?;
+
+    let pixels = header.bounds.area();
+    let [height, width] = [header.bounds.height(), header.bounds.width()].map(u64::from);
+    let per_replicate = [height, width, REPLICATES as u64, 4];
+    let stored: Vec<u64> = reader.array("counts", "<u8", &[height, width], pixels)?;
+    // Only now is it known that the file is as large as the bounds say.
+    let counts = counts(&header.coverage, header.bounds).map_err(Damage::Wrong)?;
+    if let Some(i) = (0..counts.len()).find(|&i| counts[i] != stored[i]) {
+        return wrong(format!(
+            "pixel {} counts {} samples where its coverage has {}",
+            pixel(header.bounds, i),
+            stored[i] as i64,
+            counts[i]
+        ));
+    }
+    drop(stored);
+    let sums: Vec<[Sums<f64>; REPLICATES]> = reader.array("sums", "<f8", &per_replicate, pixels)?;
+    let partial: Vec<[Sums<f32>; REPLICATES]> = if header.partial {
+        reader.array("partial", "<f4", &per_replicate, pixels)?
+    } else {
+        Vec::new()
+    };
+    reader.finish()?;
+
+    for (i, (sum, &count)) in sums.iter().zip(&counts).enumerate() {
+        check_pixel("sums", sum, count)
+            .map_err(|e| Damage::Wrong(format!("pixel {}: {e}", pixel(header.bounds, i))))?;
+    }
+    for (i, (sum, &count)) in partial.iter().zip(&counts).enumerate() {
+        check_pixel("partial", &sum.map(|s| s.map(f64::from)), count)
+            .map_err(|e| Damage::Wrong(format!("pixel {}: {e}", pixel(header.bounds, i))))?;
+    }
+    let film = Film::from_parts(
+        header.size,
+        header.bounds,
+        header.strata,
+        header.coverage,
+        sums,
+        partial,
+    );
+    Ok((film, header.provenance))
+}
+
+/// The picture position of the film's i-th pixel, for messages.
+fn pixel(bounds: Rect, i: usize) -> String {
+    let (i, width) = (i as u64, u64::from(bounds.width()));
+    let (x, y) = (i % width, i / width);
+    format!(
+        "({}, {})",
+        u64::from(bounds.x0) + x,
+        u64::from(bounds.y0) + y
+    )
+}
+
+fn check_pixel(array: &str, sums: &[Sums<f64>; REPLICATES], count: u64) -> Result<(), String> {
+    let mut all = sums.iter().flatten();
+    if let Some(x) = all.clone().find(|x| !x.is_finite()) {
+        return Err(format!("\"{array}\" holds {x}, which is not a number"));
+    }
+    if let Some(s) = sums.iter().find(|s| s[3] < 0.0) {
+        return Err(format!(
+            "\"{array}\" holds {}, a negative sum of squares",
+            s[3]
+        ));
+    }
+    if count == 0 && all.any(|&x| x != 0.0) {
+        return Err(format!(
+            "\"{array}\" holds light but no samples are counted"
+        ));
+    }
+    Ok(())
+}
+
+fn check_header(header: &Header) -> Result<(), String> {
+    let Header {
+        size,
+        bounds,
+        strata,
+        replicates,
+        block,
+        ref coverage,
+        ref provenance,
+        ..
+    } = *header;
+    if size.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
+        let [w, h] = size;
+        return Err(format!("size {w}x{h}: a side has 1 to {MAX_SIDE} pixels"));
+    }
+    if bounds.area() == 0 || bounds.intersection(&Rect::whole(size)) != Some(bounds) {
+        return Err(format!("bounds {bounds:?} do not lie in the picture"));
+    }
+    if (replicates, block) != (REPLICATES, BLOCK) {
+        return Err(format!(
+            "it has {replicates} replicates and blocks of {block} samples, not {REPLICATES} and {BLOCK}"
+        ));
+    }
+    if (size, strata) != (provenance.settings.size, provenance.settings.strata) || strata == 0 {
+        return Err("its size and strata contradict its provenance".into());
+    }
+    for (rect, ranges) in coverage.cells() {
+        if rect.area() == 0 || rect.intersection(&bounds) != Some(rect) {
+            return Err(format!("coverage {rect:?} does not lie in the film"));
+        }
+        let ordered = ranges.windows(2).all(|r| r[0].end < r[1].start);
+        let empty = ranges.iter().any(|r: &Range<u64>| r.start >= r.end);
+        if ranges.is_empty() || empty || !ordered {
+            return Err(format!("coverage has the sample ranges {ranges:?}"));
+        }
+    }
+    Ok(())
+}
+
+/// Samples of every pixel of `bounds`, row by row. An error if a pixel is covered twice.
+fn counts(coverage: &Coverage, bounds: Rect) -> Result<Vec<u64>, String> {
+    let width = bounds.width() as usize;
+    let mut counts = vec![0; width * bounds.height() as usize];
+    for (rect, ranges) in coverage.cells() {
+        let samples: u64 = ranges.iter().map(|r| r.end - r.start).sum();
+        for y in rect.y0..rect.y1 {
+            let row = (y - bounds.y0) as usize * width;
+            let columns =
+                row + (rect.x0 - bounds.x0) as usize..row + (rect.x1 - bounds.x0) as usize;
+            for count in &mut counts[columns] {
+                if *count != 0 {
+                    return Err(format!("coverage {rect:?} overlaps another"));
+                }
+                *count = samples;
+            }
+        }
+    }
+    Ok(counts)
+}

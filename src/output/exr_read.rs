@@ -1,0 +1,181 @@
+//! Reads OpenEXR pictures back, this program's and others'.
+
+use super::error::{FileError, open};
+use exr::error::Error;
+use exr::image::{AnyChannel, AnyChannels, FlatSamples, Layer};
+use exr::meta::MetaData;
+use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, Text};
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+/// How many bytes one byte of a chunk can become: deflate's limit (RFC 1951: 258 bytes from two bits),
+/// and more than the other lossless codecs reach.
+const MOST_EXPANSION: u64 = 1032;
+
+/// Pixels a side: the scene format's limit.
+const MAX_SIDE: usize = 65536;
+
+/// A picture, row by row from the top left. Every value is finite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width and height in pixels, of the data window.
+    pub size: [u32; 2],
+    /// Linear RGB.
+    pub rgb: Vec<[f32; 3]>,
+    /// 1 where the picture has samples, 0 where it has none; all 1 when the file has no such channel.
+    pub alpha: Vec<f32>,
+    /// Standard errors of R, G, B and of the luminance, >= 0, if the file has all four.
+    pub error: Option<Vec<[f32; 4]>>,
+    /// Samples of each pixel, if the file has them.
+    pub samples: Option<Vec<u32>>,
+    /// Header attributes that are text or a number, as text.
+    pub attributes: BTreeMap<String, String>,
+}
+
+/// Reads an EXR of one part with at least the channels `R`, `G` and `B`, in any of the types and any of the
+/// compressions that the exr crate knows. Values that are NaN or infinite and negative errors make
+/// the content wrong, as do damaged files; a missing or unreadable file is another error.
+pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
+    let file = open(path)?;
+    let length = file
+        .metadata()
+        .map_err(|e| FileError::io(path, "cannot read", &e))?
+        .len();
+    decode(BufReader::new(file), length).map_err(|e| match e {
+        Error::Io(e) => FileError::reading(path, &e),
+        Error::Invalid(what) => FileError::content(path, format!("no usable EXR: {what}")),
+        Error::NotSupported(what) => FileError::content(path, format!("unsupported EXR: {what}")),
+        Error::Aborted => FileError::content(path, "reading was given up"),
+    })
+}
+
+fn decode(mut from: impl Read + Seek, length: u64) -> exr::error::Result<Picture> {
+    let meta = MetaData::read_from_buffered(&mut from, false)?;
+    for header in &meta.headers {
+        let size = header.layer_size;
+        if size.0 > MAX_SIDE || size.1 > MAX_SIDE {
+            return Err(invalid(format!(
+                "{} x {} pixels; a side has at most {MAX_SIDE}",
+                size.0, size.1
+            )));
+        }
+        let most = length.saturating_mul(MOST_EXPANSION);
+        let bytes = (size.area() as u64).saturating_mul(header.channels.bytes_per_pixel as u64);
+        if bytes > most {
+            return Err(invalid(format!(
+                "{} x {} pixels cannot be in {length} bytes",
+                size.0, size.1
+            )));
+        }
+    }
+    from.rewind()?;
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        // A panic on another thread could not be told from a crash, and this is fast enough.
+        .non_parallel()
+        .from_buffered(from)?;
+    picture(image.layer_data)
+}
+
+fn invalid(message: String) -> Error {
+    Error::Invalid(message.into())
+}
+
+fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture> {
+    let size = [layer.size.0 as u32, layer.size.1 as u32];
+    let channels = &layer.channel_data.list;
+    let find = |name: &str| {
+        channels
+            .iter()
+            .find(|c| c.name.as_slice() == name.as_bytes())
+    };
+    let need = |name: &str| {
+        find(name).ok_or_else(|| {
+            let all: Vec<String> = channels.iter().map(|c| c.name.to_string()).collect();
+            invalid(format!("no channel {name}; it has {}", all.join(", ")))
+        })
+    };
+    let rgb = interleave(
+        [need("R")?, need("G")?, need("B")?],
+        size,
+        f32::NEG_INFINITY,
+    )?;
+    let alpha = match find("A") {
+        Some(a) => interleave([a], size, 0.0)?
+            .into_iter()
+            .map(|[a]| a)
+            .collect(),
+        None => vec![1.0; rgb.len()],
+    };
+    let layers = ["error.R", "error.G", "error.B", "error.Y"].map(find);
+    let error = match layers {
+        [Some(r), Some(g), Some(b), Some(y)] => Some(interleave([r, g, b, y], size, 0.0)?),
+        _ => None,
+    };
+    let samples = match find("samples").map(|c| &c.sample_data) {
+        Some(FlatSamples::U32(counts)) => Some(counts.clone()),
+        Some(_) => {
+            return Err(invalid(
+                "channel samples is not of unsigned integers".into(),
+            ));
+        }
+        None => None,
+    };
+    let mut attributes = BTreeMap::new();
+    let software = layer.attributes.software_name.iter();
+    attributes.extend(software.map(|s| ("software".to_owned(), utf8(s))));
+    for (name, value) in &layer.attributes.other {
+        let value = match value {
+            AttributeValue::Text(text) => utf8(text),
+            AttributeValue::F64(x) => x.to_string(),
+            AttributeValue::F32(x) => x.to_string(),
+            AttributeValue::I32(x) => x.to_string(),
+            _ => continue,
+        };
+        attributes.insert(utf8(name), value);
+    }
+    Ok(Picture {
+        size,
+        rgb,
+        alpha,
+        error,
+        samples,
+        attributes,
+    })
+}
+
+fn utf8(text: &Text) -> String {
+    String::from_utf8_lossy(text.as_slice()).into_owned()
+}
+
+/// The channels side by side; every value must be finite and at least `least`.
+fn interleave<const N: usize>(
+    channels: [&AnyChannel<FlatSamples>; N],
+    size: [u32; 2],
+    least: f32,
+) -> exr::error::Result<Vec<[f32; N]>> {
+    let pixels = size[0] as usize * size[1] as usize;
+    let mut out = vec![[0.0; N]; pixels];
+    for (c, channel) in channels.iter().enumerate() {
+        if channel.sample_data.len() != pixels {
+            return Err(invalid(format!("channel {} is subsampled", channel.name)));
+        }
+        let values = channel.sample_data.values_as_f32();
+        for (i, (pixel, value)) in out.iter_mut().zip(values).enumerate() {
+            if !value.is_finite() || value < least {
+                let (x, y) = (i % size[0] as usize, i / size[0] as usize);
+                return Err(invalid(format!(
+                    "channel {} is {value} at pixel ({x}, {y})",
+                    channel.name
+                )));
+            }
+            pixel[c] = value;
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,42 @@
+//! What a picture's header says of its origin: the same keys in EXR and PNG.
+
+use crate::provenance::{Provenance, integrator_name, light_name};
+
+/// Value of an entry.
+pub enum Value {
+    /// UTF-8.
+    Text(String),
+    /// Whole numbers too: exact up to 2^53.
+    Number(f64),
+}
+
+/// Keys and values, in a fixed order. What is not known, a title or a relative error, is left out.
+pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
+    let text = |s: &str| Some(Value::Text(s.into()));
+    let number = |x: f64| Some(Value::Number(x));
+    let s = &p.settings;
+    let all = [
+        ("software", text(&format!("{} {}", p.software, p.version))),
+        ("version", text(&p.version)),
+        ("scene", p.scene_title.as_deref().and_then(text)),
+        ("scene_hash", text(&p.scene_hash)),
+        ("samples", number(p.samples as f64)),
+        ("replicates", number(p.replicates.into())),
+        ("seed", number(s.seed.into())),
+        ("strata", number(s.strata.into())),
+        ("max_depth", number(s.max_depth.into())),
+        ("shadow_rays", number(s.shadow_rays.into())),
+        ("light", text(&light_name(s.light))),
+        ("integrator", text(integrator_name(s.integrator))),
+        ("adapter", text(&p.adapters())),
+        ("driver", text(&p.drivers())),
+        ("seconds", number(p.seconds)),
+        (
+            "relative_error",
+            p.relative_error.filter(|e| e.is_finite()).and_then(number),
+        ),
+    ];
+    all.into_iter()
+        .filter_map(|(key, value)| Some((key, value?)))
+        .collect()
+}

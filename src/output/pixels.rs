@@ -1,0 +1,51 @@
+//! What each pixel of the whole picture says, for writers that ask in their own order.
+
+use crate::film::coverage::Rect;
+use crate::film::{Estimate, Film, REPLICATES, replicate_counts};
+
+/// Estimates by pixel.
+pub struct Pixels<'a> {
+    film: &'a Film,
+    /// For each pixel of the film's bounds, one more than its place in `counts`; 0 where there is nothing.
+    cell: Vec<u32>,
+    counts: Vec<[u64; REPLICATES]>,
+    covered: u64,
+}
+
+impl<'a> Pixels<'a> {
+    /// Indexes the film's coverage.
+    pub fn new(film: &'a Film) -> Self {
+        let mut cell = vec![0; film.bounds.area() as usize];
+        let mut counts = Vec::new();
+        let mut covered = 0;
+        for (rect, ranges) in film.coverage.cells() {
+            counts.push(replicate_counts(ranges, film.strata));
+            covered += rect.area();
+            for y in rect.y0..rect.y1 {
+                let start = film.index(rect.x0, y);
+                cell[start..start + rect.width() as usize].fill(counts.len() as u32);
+            }
+        }
+        Self {
+            film,
+            cell,
+            counts,
+            covered,
+        }
+    }
+
+    /// What pixel (x, y) of the picture says; `None` where it has no samples.
+    pub fn at(&self, x: u32, y: u32) -> Option<Estimate> {
+        if !self.film.bounds.contains(x, y) {
+            return None;
+        }
+        let cell = self.cell[self.film.index(x, y)];
+        let counts = self.counts.get((cell as usize).checked_sub(1)?)?;
+        Some(self.film.estimate(x, y, counts))
+    }
+
+    /// Whether every pixel of the picture has samples.
+    pub fn complete(&self) -> bool {
+        self.covered == Rect::whole(self.film.size).area()
+    }
+}

@@ -1,0 +1,130 @@
+//! PNG pictures: 8 bits a channel, sRGB.
+
+use super::atomic;
+use super::error::FileError;
+use super::metadata::{Value, entries};
+use super::pixels::Pixels;
+use crate::film::Film;
+use crate::provenance::Provenance;
+use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Writes the whole picture, brightened by `exposure_stops` powers of two. Where pixels lack samples
+/// there is an alpha channel, 0 for them and 255 for the others.
+///
+/// Values round to the nearest of the 256 levels; what is brighter than 1 is 255.
+pub fn write_png(
+    path: &Path,
+    film: &Film,
+    provenance: &Provenance,
+    exposure_stops: f64,
+) -> Result<(), FileError> {
+    atomic::replace(path, |file| {
+        encode(file, film, provenance, exposure_stops).map_err(|e| match e {
+            EncodingError::IoError(e) => e,
+            other => io::Error::other(other),
+        })
+    })
+}
+
+fn encode(
+    file: impl Write,
+    film: &Film,
+    provenance: &Provenance,
+    exposure_stops: f64,
+) -> Result<(), EncodingError> {
+    let pixels = Pixels::new(film);
+    let gain = exposure_stops.exp2();
+    let [width, height] = film.size;
+    let mut encoder = Encoder::new(file, width, height);
+    let opaque = pixels.complete();
+    encoder.set_color(if opaque {
+        ColorType::Rgb
+    } else {
+        ColorType::Rgba
+    });
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+    for (key, value) in entries(provenance) {
+        let text = match value {
+            Value::Text(text) => text.replace('\0', "\u{fffd}"),
+            Value::Number(x) => x.to_string(),
+        };
+        let keyword = keyword(key).into();
+        if text.is_ascii() {
+            encoder.add_text_chunk(keyword, text)?;
+        } else {
+            encoder.add_itxt_chunk(keyword, text)?;
+        }
+    }
+    let mut writer = encoder.write_header()?;
+    let mut rows = writer.stream_writer()?;
+    let mut row = Vec::new();
+    for y in 0..height {
+        row.clear();
+        for x in 0..width {
+            match pixels.at(x, y) {
+                Some(e) => {
+                    row.extend(e.mean.map(|v| encode_srgb(v * gain)));
+                    row.extend((!opaque).then_some(255));
+                }
+                None => row.extend([0; 4]),
+            }
+        }
+        rows.write_all(&row)?;
+    }
+    rows.finish()?;
+    writer.finish()
+}
+
+/// The PNG specification's own keyword where it has one (11.3.3.1), else the key.
+fn keyword(key: &'static str) -> &'static str {
+    match key {
+        "software" => "Software",
+        "scene" => "Title",
+        other => other,
+    }
+}
+
+/// Level 0..=255 of a linear value: IEC 61966-2-1, both pieces of its curve. NaN is 0.
+fn encode_srgb(linear: f64) -> u8 {
+    let v = linear.clamp(0.0, 1.0);
+    let encoded = if v <= 0.003_130_8 {
+        12.92 * v
+    } else {
+        1.055 * v.powf(1.0 / 2.4) - 0.055
+    };
+    (255.0 * encoded).round() as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_levels_are_the_standard_s() {
+        // Decoding each level and encoding it again gives the level back.
+        for level in 0..=255u8 {
+            let v = f64::from(level) / 255.0;
+            let linear = if v <= 0.04045 {
+                v / 12.92
+            } else {
+                ((v + 0.055) / 1.055).powf(2.4)
+            };
+            assert_eq!(encode_srgb(linear), level);
+        }
+        // Mid grey, and a value on the straight piece: 0.002 * 12.92 * 255 = 6.59.
+        assert_eq!(encode_srgb(0.18), 118);
+        assert_eq!(encode_srgb(0.002), 7);
+        for (out_of_range, level) in [
+            (-1.0, 0),
+            (f64::NAN, 0),
+            (1.01, 255),
+            (f64::INFINITY, 255),
+            (-0.0, 0),
+        ] {
+            assert_eq!(encode_srgb(out_of_range), level);
+        }
+    }
+}

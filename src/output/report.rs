@@ -1,0 +1,222 @@
+//! The report of a run: JSON for scripts.
+
+use super::atomic;
+use super::error::FileError;
+use crate::engine::{Counters, DeviceInfo};
+use crate::film::Film;
+use crate::film::coverage::Rect;
+use crate::provenance::Provenance;
+use serde::Serialize;
+use std::io::{self, Write};
+use std::path::Path;
+
+/// What a run did. Numbers that are not known are null, never NaN.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Version of the program.
+    pub version: String,
+    /// The scene file's name.
+    pub scene: String,
+    /// Hash of scene and settings.
+    pub scene_hash: String,
+    /// What it ran on.
+    pub adapter: Adapter,
+    /// Width and height of the whole picture.
+    pub resolution: [u32; 2],
+    /// Pixel rectangles x0, y0, x1, y1 that were asked for; empty for the whole picture.
+    pub regions: Vec<[u32; 4]>,
+    /// Seed.
+    pub seed: u32,
+    /// Samples of the pixel that has the most, those of earlier runs included.
+    pub spp: u64,
+    /// Which condition ended the run.
+    pub stop_reason: String,
+    /// Where the time went.
+    pub seconds: Seconds,
+    /// Camera paths of this run.
+    pub paths: u64,
+    /// Rays of this run, shadow rays included.
+    pub rays: u64,
+    /// Over the rendering time.
+    pub paths_per_second: Option<f64>,
+    /// Over the rendering time.
+    pub rays_per_second: Option<f64>,
+    /// Of the picture; null while nothing is known.
+    pub relative_error: Option<f64>,
+    /// Of the pixels that have samples; null if it is not finite.
+    pub mean_luminance: f64,
+    /// Paths of this run cut at max_depth.
+    pub truncated_paths: u64,
+    /// Samples of this run left out because they were NaN or infinite.
+    pub nonfinite_samples: u64,
+}
+
+/// Key `adapter`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[expect(missing_docs, reason = "see DeviceInfo")]
+pub struct Adapter {
+    pub name: String,
+    pub driver: String,
+    pub backend: String,
+}
+
+/// Key `seconds`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Seconds {
+    /// Making the kernel.
+    pub compile: f64,
+    /// Rendering.
+    pub render: f64,
+    /// The whole run.
+    pub total: f64,
+}
+
+/// What only the run itself knows.
+#[derive(Debug, Clone)]
+pub struct Run<'a> {
+    /// The scene file's name as it was given.
+    pub scene: String,
+    /// What it ran on.
+    pub device: &'a DeviceInfo,
+    /// What `--region` asked for; empty for the whole picture.
+    pub regions: &'a [Rect],
+    /// Which condition ended it.
+    pub stop_reason: String,
+    /// Where the time went.
+    pub seconds: Seconds,
+    /// Its counts.
+    pub counters: Counters,
+}
+
+impl Report {
+    /// The report of `run`, which has left `film`.
+    pub fn new(run: Run, film: &Film, provenance: &Provenance) -> Self {
+        let rate = |count: u64| {
+            let seconds = run.seconds.render;
+            (seconds > 0.0).then(|| count as f64 / seconds)
+        };
+        Self {
+            version: provenance.version.clone(),
+            scene: run.scene,
+            scene_hash: provenance.scene_hash.clone(),
+            adapter: Adapter {
+                name: run.device.name.clone(),
+                driver: run.device.driver.clone(),
+                backend: run.device.backend.clone(),
+            },
+            resolution: film.size,
+            regions: run
+                .regions
+                .iter()
+                .map(|r| [r.x0, r.y0, r.x1, r.y1])
+                .collect(),
+            seed: provenance.settings.seed,
+            spp: film.coverage.samples().1,
+            stop_reason: run.stop_reason,
+            seconds: run.seconds,
+            paths: run.counters.paths,
+            rays: run.counters.rays,
+            paths_per_second: rate(run.counters.paths),
+            rays_per_second: rate(run.counters.rays),
+            relative_error: film.relative_error(),
+            mean_luminance: film.mean_luminance(),
+            truncated_paths: run.counters.truncated,
+            nonfinite_samples: run.counters.nonfinite,
+        }
+    }
+
+    /// Indented JSON and a line break, keys in the order of the fields.
+    pub fn to_json(&self) -> String {
+        // Strings, numbers, lists and fixed keys: nothing that could fail. serde_json writes what is
+        // not finite as null.
+        let mut json = serde_json::to_string_pretty(self).expect("a report is plain data");
+        json.push('\n');
+        json
+    }
+
+    /// Writes it to a file, or to standard output if `path` is `-`.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let json = self.to_json();
+        if path == Path::new("-") {
+            let mut out = io::stdout().lock();
+            return out
+                .write_all(json.as_bytes())
+                .and_then(|()| out.flush())
+                .map_err(|e| FileError::io(Path::new("standard output"), "cannot write", &e));
+        }
+        atomic::replace(path, |file| file.write_all(json.as_bytes()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::provenance::tests::{device, example};
+    use serde_json::{Value, json};
+
+    fn report(film: &Film, render: f64) -> Value {
+        let run = Run {
+            scene: "a.toml".into(),
+            device: &device("llvmpipe"),
+            regions: &[film.bounds],
+            stop_reason: "spp".into(),
+            seconds: Seconds {
+                compile: 0.5,
+                render,
+                total: 3.0,
+            },
+            counters: Counters {
+                paths: 8,
+                rays: 20,
+                truncated: 1,
+                nonfinite: 0,
+                first_nonfinite: None,
+            },
+        };
+        serde_json::from_str(&Report::new(run, film, &example(film.size)).to_json()).unwrap()
+    }
+
+    #[test]
+    fn keys_are_those_of_the_command_line_s_description() {
+        let rect = Rect::whole([2, 1]);
+        let mut film = Film::new([2, 1], rect, 1);
+        film.put_samples(rect, 0..4, vec![[[0.5, 0.5, 0.5, 0.25]; 4]; 2]);
+        let expected = json!({
+            "version": "0.1.0",
+            "scene": "a.toml",
+            "scene_hash": "0123456789abcdef".repeat(4),
+            "adapter": {"name": "llvmpipe", "driver": "llvmpipe driver 1", "backend": "gpu"},
+            "resolution": [2, 1],
+            "regions": [[0, 0, 2, 1]],
+            "seed": u32::MAX,
+            "spp": 4,
+            "stop_reason": "spp",
+            "seconds": {"compile": 0.5, "render": 2.0, "total": 3.0},
+            "paths": 8,
+            "rays": 20,
+            "paths_per_second": 4.0,
+            "rays_per_second": 10.0,
+            "relative_error": 0.0,
+            "mean_luminance": 0.5,
+            "truncated_paths": 1,
+            "nonfinite_samples": 0,
+        });
+        assert_eq!(report(&film, 2.0), expected);
+    }
+
+    #[test]
+    fn what_is_not_known_is_null() {
+        let rect = Rect::whole([1, 1]);
+        let mut film = Film::new([1, 1], rect, 1);
+        film.put_samples(rect, 0..1, vec![[[f64::INFINITY; 4]; 4]]);
+        let r = report(&film, 0.0);
+        for key in [
+            "relative_error",
+            "mean_luminance",
+            "paths_per_second",
+            "rays_per_second",
+        ] {
+            assert_eq!(r[key], Value::Null, "{key}");
+        }
+    }
+}

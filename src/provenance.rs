@@ -1,0 +1,319 @@
+//! Where a film comes from: enough to make it again, and to know what may be added to it.
+
+use crate::engine::{Counters, DeviceInfo};
+use crate::film::Film;
+use crate::scene::Scene;
+use crate::scene::hash::scene_hash;
+use crate::settings::{Integrator, LightParts, Settings};
+use serde::{Deserialize, Serialize};
+
+/// Changes whenever a sample of the same number and seed gets another value.
+pub const SAMPLER_VERSION: u32 = 1;
+
+/// What a film was made from, by and on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// The program's name.
+    pub software: String,
+    /// Its version.
+    pub version: String,
+    /// [`SAMPLER_VERSION`] of the program.
+    pub sampler_version: u32,
+    /// The scene's title.
+    pub scene_title: Option<String>,
+    /// [`scene_hash`] of scene and settings.
+    pub scene_hash: String,
+    /// The scene file's own text.
+    pub scene_text: String,
+    /// Everything else that decides the samples.
+    pub settings: Settings,
+    /// Samples of the covered pixel that has the fewest.
+    pub samples: u64,
+    /// Independent replicates behind the error of the covered pixel that has the fewest.
+    pub replicates: u32,
+    /// What it was rendered on, in order of first use.
+    pub devices: Vec<DeviceUse>,
+    /// Rendering time over all runs.
+    pub seconds: f64,
+    /// Counts over all runs.
+    pub counters: Counters,
+    /// The picture's [relative error](Film::relative_error), where it is known.
+    pub relative_error: Option<f64>,
+}
+
+/// A device's share of the work.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DeviceUse {
+    /// Which device.
+    pub device: DeviceInfo,
+    /// Camera paths made there: samples times pixels.
+    pub samples: u64,
+    /// Rendering time there.
+    pub seconds: f64,
+}
+
+impl Provenance {
+    /// For a new film of `scene`, whose file reads `scene_text`.
+    pub fn new(scene: &Scene, scene_text: impl Into<String>, settings: &Settings) -> Self {
+        Self {
+            software: env!("CARGO_PKG_NAME").into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            sampler_version: SAMPLER_VERSION,
+            scene_title: scene.title.clone(),
+            scene_hash: scene_hash(scene, settings),
+            scene_text: scene_text.into(),
+            settings: settings.clone(),
+            samples: 0,
+            replicates: 0,
+            devices: Vec::new(),
+            seconds: 0.0,
+            counters: Counters::default(),
+            relative_error: None,
+        }
+    }
+
+    /// Adds work done on `device`.
+    pub fn add_work(&mut self, device: &DeviceInfo, counters: Counters, seconds: f64) {
+        self.add_use(DeviceUse {
+            device: device.clone(),
+            samples: counters.paths,
+            seconds,
+        });
+        self.counters += counters;
+        self.seconds += seconds;
+    }
+
+    /// Takes samples, replicates and relative error from the film as it now stands.
+    pub fn describe(&mut self, film: &Film) {
+        self.samples = film.coverage.samples().0;
+        self.replicates = film.replicates().0;
+        self.relative_error = film.relative_error();
+    }
+
+    /// Adds the work behind another film that is merged into this one's; [`describe`](Self::describe)
+    /// the sum afterwards.
+    pub fn absorb(&mut self, other: &Self) {
+        for used in &other.devices {
+            self.add_use(used.clone());
+        }
+        self.counters += other.counters;
+        self.seconds += other.seconds;
+    }
+
+    fn add_use(&mut self, new: DeviceUse) {
+        match self.devices.iter_mut().find(|u| u.device == new.device) {
+            Some(used) => {
+                used.samples += new.samples;
+                used.seconds += new.seconds;
+            }
+            None => self.devices.push(new),
+        }
+    }
+
+    /// Whether sample k of a pixel has the same value in both, so that a film of one can be gone on with
+    /// as the other, or disjoint samples of both added up. The error names all that differs, this
+    /// one's value first.
+    pub fn same_samples(&self, other: &Self) -> Result<(), String> {
+        let (a, b) = (&self.settings, &other.settings);
+        let mut differ = Vec::new();
+        let mut check = |what: &str, a: String, b: String| {
+            if a != b {
+                differ.push(format!("{what} is {a} and {b}"));
+            }
+        };
+        let size = |s: &Settings| format!("{}x{}", s.size[0], s.size[1]);
+        check("size", size(a), size(b));
+        check(
+            "max_depth",
+            a.max_depth.to_string(),
+            b.max_depth.to_string(),
+        );
+        check("light", light_name(a.light), light_name(b.light));
+        check(
+            "integrator",
+            integrator_name(a.integrator).into(),
+            integrator_name(b.integrator).into(),
+        );
+        check("strata", a.strata.to_string(), b.strata.to_string());
+        check(
+            "shadow_rays",
+            a.shadow_rays.to_string(),
+            b.shadow_rays.to_string(),
+        );
+        check("seed", a.seed.to_string(), b.seed.to_string());
+        let sampler = |p: &Self| format!("{} (of version {})", p.sampler_version, p.version);
+        if self.sampler_version != other.sampler_version {
+            check("sampler", sampler(self), sampler(other));
+        }
+        let same_expected_settings = (a.size, a.max_depth, a.light, a.integrator)
+            == (b.size, b.max_depth, b.light, b.integrator);
+        // The hash covers those settings too: where one of them differs, it says nothing of the scene.
+        if same_expected_settings {
+            let scene = |p: &Self| {
+                let title = p.scene_title.as_deref().unwrap_or("untitled");
+                let hash: String = p.scene_hash.chars().take(12).collect();
+                format!("{title:?} ({hash})")
+            };
+            if self.scene_hash != other.scene_hash {
+                check("scene", scene(self), scene(other));
+            }
+        }
+        if differ.is_empty() {
+            Ok(())
+        } else {
+            Err(differ.join("; "))
+        }
+    }
+
+    /// The names of all adapters used; empty when nothing was rendered.
+    pub fn adapters(&self) -> String {
+        self.join(|d| &d.name)
+    }
+
+    /// The drivers of all adapters used, in the same order.
+    pub fn drivers(&self) -> String {
+        self.join(|d| &d.driver)
+    }
+
+    fn join(&self, of: impl Fn(&DeviceInfo) -> &str) -> String {
+        let all: Vec<&str> = self.devices.iter().map(|u| of(&u.device)).collect();
+        all.join("; ")
+    }
+}
+
+/// `emitted,direct,indirect` or what is kept of it, as `--light` reads it.
+pub fn light_name(light: LightParts) -> String {
+    let parts = [
+        (light.emitted, "emitted"),
+        (light.direct, "direct"),
+        (light.indirect, "indirect"),
+    ];
+    let kept: Vec<&str> = parts.iter().filter(|p| p.0).map(|p| p.1).collect();
+    kept.join(",")
+}
+
+/// As `--integrator` reads it.
+pub fn integrator_name(integrator: Integrator) -> &'static str {
+    match integrator {
+        Integrator::Path => "path",
+        Integrator::Whitted => "whitted",
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A provenance for films of 2 x 2 strata, without a scene behind it.
+    pub(crate) fn example(size: [u32; 2]) -> Provenance {
+        let mut p = Provenance {
+            software: "etendue".into(),
+            version: "0.1.0".into(),
+            sampler_version: SAMPLER_VERSION,
+            scene_title: Some("Kästchen – \"one\"".into()),
+            scene_hash: "0123456789abcdef".repeat(4),
+            scene_text: "title = \"Kästchen\" # text\n".into(),
+            settings: Settings {
+                size,
+                max_depth: 64,
+                max_depth_is_default: true,
+                strata: 2,
+                seed: u32::MAX,
+                shadow_rays: 1,
+                light: LightParts::ALL,
+                integrator: Integrator::Path,
+            },
+            samples: 0,
+            replicates: 0,
+            devices: Vec::new(),
+            seconds: 0.0,
+            counters: Counters::default(),
+            relative_error: None,
+        };
+        p.add_work(&device("llvmpipe"), counters(12), 1.5);
+        p
+    }
+
+    pub(crate) fn device(name: &str) -> DeviceInfo {
+        DeviceInfo {
+            name: name.into(),
+            driver: format!("{name} driver 1"),
+            backend: "gpu".into(),
+            software: true,
+        }
+    }
+
+    fn counters(paths: u64) -> Counters {
+        Counters {
+            paths,
+            rays: 3 * paths,
+            truncated: 1,
+            nonfinite: 1,
+            first_nonfinite: Some((1, 2, paths)),
+        }
+    }
+
+    #[test]
+    fn each_thing_that_changes_samples_is_named() {
+        let a = example([4, 3]);
+        assert_eq!(a.same_samples(&a), Ok(()));
+        type Edit = fn(&mut Provenance);
+        let edits: [(&str, Edit); 9] = [
+            ("size is 4x3 and 4x4", |p| p.settings.size[1] = 4),
+            ("max_depth is 64 and 5", |p| p.settings.max_depth = 5),
+            (
+                "light is emitted,direct,indirect and emitted,indirect",
+                |p| p.settings.light.direct = false,
+            ),
+            ("integrator is path and whitted", |p| {
+                p.settings.integrator = Integrator::Whitted;
+            }),
+            ("strata is 2 and 3", |p| p.settings.strata = 3),
+            ("shadow_rays is 1 and 2", |p| p.settings.shadow_rays = 2),
+            ("seed is 4294967295 and 7", |p| p.settings.seed = 7),
+            (
+                "sampler is 1 (of version 0.1.0) and 2 (of version 9)",
+                |p| (p.sampler_version, p.version) = (2, "9".into()),
+            ),
+            (
+                "scene is \"Kästchen – \\\"one\\\"\" (0123456789ab) and \"untitled\" (ff)",
+                |p| (p.scene_hash, p.scene_title) = ("ff".into(), None),
+            ),
+        ];
+        for (expected, edit) in edits {
+            let mut b = a.clone();
+            edit(&mut b);
+            assert_eq!(a.same_samples(&b).unwrap_err(), expected);
+        }
+        let mut other = a.clone();
+        (other.version, other.scene_title) = ("0.2.0".into(), None);
+        other.add_work(&device("another"), counters(1), 1.0);
+        assert_eq!(
+            a.same_samples(&other),
+            Ok(()),
+            "other adapters, titles and versions do no harm"
+        );
+    }
+
+    #[test]
+    fn work_adds_up_by_device() {
+        let mut a = example([4, 3]);
+        let mut b = example([4, 3]);
+        b.add_work(&device("zebra"), counters(5), 0.25);
+        a.absorb(&b);
+        assert_eq!(a.adapters(), "llvmpipe; zebra");
+        let work: Vec<_> = a.devices.iter().map(|d| (d.samples, d.seconds)).collect();
+        assert_eq!(work, [(24, 3.0), (5, 0.25)]);
+        assert_eq!((a.counters.paths, a.counters.rays), (29, 87));
+        assert_eq!(a.counters.first_nonfinite, Some((1, 2, 12)));
+        assert_eq!(a.seconds, 3.25);
+    }
+
+    #[test]
+    fn json_keeps_everything() {
+        let mut p = example([4, 3]);
+        p.relative_error = Some(0.015625);
+        let text = serde_json::to_string(&p).unwrap();
+        assert_eq!(serde_json::from_str::<Provenance>(&text).unwrap(), p);
+    }
+}
