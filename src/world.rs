@@ -100,6 +100,8 @@ pub struct WorldLight {
     pub radius: f64,
     /// Radiance that the *eye* sees it with through clear media: emitted radiance times (n_eye / n_light)².
     pub radiance: DVec3,
+    /// Radiance that it emits, as the scene says.
+    pub emitted: DVec3,
     /// Identity of its plane, shared with coincident planar faces.
     pub face: u32,
     /// Line in the scene file.
@@ -166,6 +168,7 @@ impl World {
                 offset: l.normal.dot(l.center - origin),
                 radius: l.radius,
                 radiance: l.radiance,
+                emitted: l.radiance,
                 face: 0,
                 line: l.line,
             })

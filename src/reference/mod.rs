@@ -1,1 +1,136 @@
-//! The CPU reference: the same light transport in f64, written to be read.
+//! The CPU reference: the same light transport in f64, written to be read, and to be held against.
+//!
+//! One file for each part, named as the shader module that does the same; it shares the [`World`] with the
+//! GPU and nothing else. Two estimators of the same picture: agreement between one that samples lights and one
+//! that only ever finds them by chance leaves little room for an error in either.
+
+pub mod camera;
+pub mod cylinder;
+pub mod dielectric;
+pub mod diffuse;
+pub mod disk;
+pub mod frame;
+pub mod light;
+pub mod mirror;
+pub mod path;
+pub mod phong;
+pub mod plane;
+pub mod sampler;
+pub mod sphere;
+pub mod tracer;
+
+#[cfg(test)]
+mod brute_force;
+#[cfg(test)]
+mod chi_square;
+
+pub use sampler::Sampler;
+pub use tracer::{Hit, Met, Ray, Tracer};
+
+use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
+use crate::film::coverage::Rect;
+use crate::film::{Film, REPLICATES, Sums};
+use crate::settings::Settings;
+use crate::stats::luminance;
+use crate::world::World;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How a path finds lights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Estimator {
+    /// Shadow rays at every surface that is not a delta function, weighted against chance hits.
+    LightSampling,
+    /// Chance hits alone.
+    NoLightSampling,
+}
+
+/// Makes samples on the CPU, on rayon's threads.
+#[derive(Debug)]
+pub struct CpuEngine {
+    tracer: Tracer,
+    device: DeviceInfo,
+}
+
+impl CpuEngine {
+    /// An engine for `world`, which was made for a picture of `settings.size`.
+    pub fn new(world: World, settings: Settings, estimator: Estimator) -> Self {
+        Self {
+            tracer: Tracer::new(world, settings, estimator),
+            device: DeviceInfo {
+                name: "CPU reference (f64)".to_owned(),
+                driver: format!("{} threads", rayon::current_num_threads()),
+                backend: "cpu".to_owned(),
+                software: true,
+            },
+        }
+    }
+
+    /// Adds samples to one pixel's sums, one after another. `None` when told to stop.
+    fn render_pixel(
+        &self,
+        [x, y]: [u32; 2],
+        samples: Range<u64>,
+        mut sums: [Sums<f64>; REPLICATES],
+        stop: &AtomicBool,
+    ) -> Option<([Sums<f64>; REPLICATES], Counters)> {
+        let round = self.tracer.settings().round();
+        let mut counters = Counters::default();
+        for sample in samples {
+            if stop.load(Ordering::Relaxed) {
+                return None;
+            }
+            let traced = self.tracer.sample_pixel([x, y], sample);
+            counters.paths += 1;
+            counters.rays += traced.rays;
+            counters.truncated += u64::from(traced.truncated);
+            let rgb = traced.radiance.to_array();
+            if !traced.radiance.is_finite() {
+                counters.nonfinite += 1;
+                counters.first_nonfinite = counters.first_nonfinite.or(Some((x, y, sample)));
+                continue;
+            }
+            let replicate = (sample / round % REPLICATES as u64) as usize;
+            let added = [rgb[0], rgb[1], rgb[2], luminance(rgb).powi(2)];
+            for (sum, value) in sums[replicate].iter_mut().zip(added) {
+                *sum += value;
+            }
+        }
+        Some((sums, counters))
+    }
+}
+
+impl Engine for CpuEngine {
+    fn render(
+        &mut self,
+        film: &mut Film,
+        rect: Rect,
+        samples: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError> {
+        let before = &*film;
+        let pixels: Option<Vec<_>> = (0..rect.area())
+            .into_par_iter()
+            .map(|k| {
+                let width = u64::from(rect.width());
+                let x = rect.x0 + (k % width) as u32;
+                let y = rect.y0 + (k / width) as u32;
+                let sums = before.sums()[before.index(x, y)];
+                self.render_pixel([x, y], samples.clone(), sums, stop)
+            })
+            .collect();
+        let (sums, counters): (Vec<_>, Vec<_>) =
+            pixels.ok_or(EngineError::Stopped)?.into_iter().unzip();
+        film.put_samples(rect, samples, sums);
+        let mut total = Counters::default();
+        for c in counters {
+            total += c;
+        }
+        Ok(total)
+    }
+
+    fn device(&self) -> &DeviceInfo {
+        &self.device
+    }
+}

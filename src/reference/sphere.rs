@@ -1,0 +1,264 @@
+//! Spheres: ordinary ones (Haines, Günther & Akenine-Möller, Ray Tracing Gems ch. 7), and huge ones given by
+//! the point nearest the scene and their curvature.
+
+use super::tracer::Ray;
+use glam::DVec3;
+
+/// Distance >= 0 to the sphere from outside.
+///
+/// A ray that rounding has put just inside meets the sphere at once if it goes inwards, else not at all.
+pub fn enter(center: DVec3, radius: f64, ray: &Ray) -> Option<f64> {
+    let f = ray.origin - center;
+    let b = -f.dot(ray.direction);
+    let discriminant = discriminant(f, b, radius, ray.direction);
+    if b <= 0.0 || discriminant < 0.0 {
+        return None;
+    }
+    let c = (f.length() - radius) * (f.length() + radius);
+    Some((c / (b + discriminant.sqrt())).max(0.0))
+}
+
+/// Distance >= 0 to the sphere from inside; `on_it` when the ray starts on the sphere: one root is 0, and
+/// the other then needs no square root.
+pub fn leave(center: DVec3, radius: f64, on_it: bool, ray: &Ray) -> f64 {
+    let f = ray.origin - center;
+    let b = -f.dot(ray.direction);
+    if on_it {
+        return (2.0 * b).max(0.0);
+    }
+    let root = discriminant(f, b, radius, ray.direction).max(0.0).sqrt();
+    let t = if b >= 0.0 {
+        b + root
+    } else {
+        let c = (f.length() - radius) * (f.length() + radius);
+        c / (b - root)
+    };
+    t.max(0.0)
+}
+
+/// r² less the squared distance from the centre to the ray's line.
+fn discriminant(f: DVec3, b: f64, radius: f64, direction: DVec3) -> f64 {
+    let nearest = f + b * direction;
+    radius * radius - nearest.length_squared()
+}
+
+/// `p` put back on the sphere, and the outward unit normal there.
+pub fn project(center: DVec3, radius: f64, p: DVec3) -> (DVec3, DVec3) {
+    let normal = (p - center).normalize();
+    (center + normal * radius, normal)
+}
+
+/// A sphere as the set k v·v + 2 n·v = 0 with v = p - pole, k = 1/radius and n the outward normal at
+/// the pole: no number in it is larger than the scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Huge {
+    /// The surface point nearest the scene.
+    pub pole: DVec3,
+    /// Outward unit normal there.
+    pub normal: DVec3,
+    /// Radius.
+    pub radius: f64,
+}
+
+impl Huge {
+    /// As [`enter`].
+    pub fn enter(&self, ray: &Ray) -> Option<f64> {
+        let (b, c) = self.coefficients(ray);
+        let discriminant = b * b - c / self.radius;
+        if b >= 0.0 || discriminant < 0.0 {
+            return None;
+        }
+        Some((c / (-b + discriminant.sqrt())).max(0.0))
+    }
+
+    /// As [`leave`].
+    pub fn leave(&self, on_it: bool, ray: &Ray) -> f64 {
+        let (b, c) = self.coefficients(ray);
+        if on_it {
+            return (-2.0 * b * self.radius).max(0.0);
+        }
+        let root = (b * b - c / self.radius).max(0.0).sqrt();
+        let t = if b <= 0.0 {
+            (-b + root) * self.radius
+        } else {
+            -c / (b + root)
+        };
+        t.max(0.0)
+    }
+
+    /// B and C of k t² + 2 B t + C = 0.
+    fn coefficients(&self, ray: &Ray) -> (f64, f64) {
+        let v = ray.origin - self.pole;
+        (
+            v.dot(ray.direction) / self.radius + self.normal.dot(ray.direction),
+            v.length_squared() / self.radius + 2.0 * self.normal.dot(v),
+        )
+    }
+
+    /// As [`project`]: one Newton step along the gradient, whose length is 1 on the surface.
+    pub fn project(&self, p: DVec3) -> (DVec3, DVec3) {
+        let v = p - self.pole;
+        let gradient = self.normal + v / self.radius;
+        let height = (v.length_squared() / self.radius + 2.0 * self.normal.dot(v)) / 2.0;
+        (p - gradient * height, gradient.normalize())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::brute_force::{self, random_direction, random_point};
+    use crate::reference::sampler::Sampler;
+
+    fn ray(origin: DVec3, direction: DVec3) -> Ray {
+        Ray {
+            origin,
+            direction: direction.normalize(),
+            medium: 0,
+            face: 0,
+        }
+    }
+
+    #[test]
+    fn random_rays_agree_with_bisection() {
+        let mut rng = Sampler::new(1, 0, 0);
+        let (center, radius) = (DVec3::new(0.3, -0.2, 0.5), 0.8);
+        let (mut outside, mut inside) = (0, 0);
+        for _ in 0..3000 {
+            let r = ray(random_point(&mut rng, 2.0), random_direction(&mut rng));
+            let found = brute_force::span(&r, |p| p.distance(center) - radius);
+            if r.origin.distance(center) > radius {
+                let expected = found.filter(|s| s[1] > 0.0).map(|s| s[0]);
+                brute_force::assert_same_hit(&r, enter(center, radius, &r), expected);
+                outside += u32::from(expected.is_some());
+            } else {
+                let expected = found.map(|s| s[1]);
+                brute_force::assert_same_hit(&r, Some(leave(center, radius, false, &r)), expected);
+                inside += 1;
+            }
+        }
+        assert!(outside > 50 && inside > 50, "{outside} {inside}");
+    }
+
+    #[test]
+    fn chords_from_the_surface_are_2_cos_theta_long() {
+        let (center, radius) = (DVec3::new(100.0, 100.0, 100.0), 1.0);
+        let mut rng = Sampler::new(2, 0, 0);
+        for k in 0..100_000 {
+            let normal = random_direction(&mut rng);
+            let d = random_direction(&mut rng);
+            // Every other chord is glancing.
+            let d = if k % 2 == 0 {
+                d
+            } else {
+                (d - normal * d.dot(normal) * (1.0 - 1e-6)).normalize()
+            };
+            let d = if d.dot(normal) > 0.0 { -d } else { d };
+            let r = ray(center + normal * radius, d);
+            let t = leave(center, radius, true, &r);
+            assert!((t + 2.0 * d.dot(normal)).abs() < 1e-13, "{t}");
+        }
+    }
+
+    #[test]
+    fn a_unit_sphere_far_away_is_hit_to_one_part_in_ten_million() {
+        let mut rng = Sampler::new(3, 0, 0);
+        for _ in 0..1000 {
+            let to = random_direction(&mut rng);
+            let center = to * 1e4;
+            let across = to.cross(random_direction(&mut rng)).normalize();
+            let miss = rng.uniform();
+            // Aimed at a point at distance `miss` from the centre, across the line of sight.
+            let r = ray(DVec3::ZERO, center + across * miss);
+            let angle = (miss / 1e4).atan();
+            let expected = 1e4 * angle.cos() - (1.0 - (1e4 * angle.sin()).powi(2)).sqrt();
+            let t = enter(center, 1.0, &r).unwrap();
+            assert!(
+                (t - expected).abs() < 1e-7 / (1.0 - miss).sqrt(),
+                "{miss}: {t} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn tangent_rays_hit_or_miss_in_order() {
+        let mut hits = Vec::new();
+        for k in -8..=8 {
+            let miss = 1.0 - f64::from(k) * (-20f64).exp2();
+            let r = ray(DVec3::new(-3.0, miss, 0.0), DVec3::X);
+            let t = enter(DVec3::ZERO, 1.0, &r);
+            assert!(t.is_none_or(f64::is_finite));
+            hits.push(t.is_some());
+        }
+        let first = hits.iter().position(|&h| h).unwrap();
+        assert_eq!(first, 8, "the tangent itself is a hit: {hits:?}");
+        assert!(hits[first..].iter().all(|&h| h), "{hits:?}");
+    }
+
+    #[test]
+    fn a_ray_just_inside_by_rounding_enters_or_is_free() {
+        let origin = DVec3::new(1.0 - 1e-16, 0.0, 0.0);
+        assert_eq!(enter(DVec3::ZERO, 1.0, &ray(origin, -DVec3::X)), Some(0.0));
+        assert_eq!(enter(DVec3::ZERO, 1.0, &ray(origin, DVec3::X)), None);
+    }
+
+    #[test]
+    fn the_huge_form_agrees_with_the_ordinary_one() {
+        let normal = DVec3::new(0.2, 1.0, -0.3).normalize();
+        let radius = 1e5;
+        let huge = Huge {
+            pole: DVec3::new(0.1, -1.0, 0.4),
+            normal,
+            radius,
+        };
+        let center = huge.pole - normal * radius;
+        let mut rng = Sampler::new(4, 0, 0);
+        for _ in 0..2000 {
+            let r = ray(random_point(&mut rng, 3.0), random_direction(&mut rng));
+            // One ulp of the ordinary form's numbers, 1e5, is 1.5e-11; glancing rays magnify it.
+            let close = |a: f64, b: f64| (a - b).abs() < 1e-7 * (1.0 + a.abs());
+            if r.origin.distance(center) > radius {
+                match (huge.enter(&r), enter(center, radius, &r)) {
+                    (Some(a), Some(b)) => {
+                        assert!(close(a, b), "{a} {b}");
+                        let (p, n) = huge.project(r.at(a));
+                        assert!((p.distance(center) - radius).abs() < 1e-10);
+                        assert!((n - (p - center) / radius).length() < 1e-12);
+                    }
+                    (a, b) => assert_eq!(a, b),
+                }
+            } else {
+                let (a, b) = (huge.leave(false, &r), leave(center, radius, false, &r));
+                assert!(close(a, b), "{a} {b}");
+                let (p, _) = huge.project(r.at(huge.leave(false, &r)));
+                let back = Ray {
+                    origin: p,
+                    direction: -r.direction,
+                    ..r
+                };
+                let through = huge.leave(true, &back);
+                assert!(close(
+                    huge.leave(
+                        false,
+                        &Ray {
+                            origin: p - r.direction * 1e-3,
+                            ..back
+                        }
+                    ),
+                    through - 1e-3
+                ));
+            }
+        }
+    }
+
+    #[test]
+    fn a_sphere_of_infinite_radius_is_a_plane() {
+        let plane = Huge {
+            pole: DVec3::ZERO,
+            normal: DVec3::Y,
+            radius: f64::INFINITY,
+        };
+        let r = ray(DVec3::new(0.0, 3.0, 0.0), DVec3::new(3.0, -4.0, 0.0));
+        assert!((plane.enter(&r).unwrap() - 3.75).abs() < 1e-15);
+    }
+}
