@@ -119,7 +119,7 @@ fn status_0_and_the_default_outputs() {
         .run("render box.toml --backend cpu --spp 1")
         .success()
         .stdout("")
-        .stderr(says("24x16").and(says("until 1 samples a pixel")))
+        .stderr(says("24x16").and(says("until 1 sample a pixel")))
         .stderr(says("wrote box.exr, box.png"));
     assert_eq!(bench.names(), ["box.exr", "box.png", "box.toml"]);
 }
@@ -157,10 +157,10 @@ fn status_2_for_a_bad_command_line() {
         ("--no-such-flag", "--no-such-flag"),
     ] {
         bench
-            .run(&format!("render box.toml --backend cpu --spp 1 {flags}").replace(
-                "--spp 1 --samples",
-                "--samples",
-            ))
+            .run(
+                &format!("render box.toml --backend cpu --spp 1 {flags}")
+                    .replace("--spp 1 --samples", "--samples"),
+            )
             .code(2)
             .stdout("")
             .stderr(says("error: ").and(says(rule)));
@@ -175,12 +175,17 @@ fn status_2_for_a_bad_command_line() {
 #[test]
 fn status_2_for_a_bad_scene_names_line_and_column() {
     let bench = Bench::new();
-    fs::write(bench.path("bad.toml"), SCENE.replace("\"steel\"", "\"stel\"")).unwrap();
+    fs::write(
+        bench.path("bad.toml"),
+        SCENE.replace("\"steel\"", "\"stel\""),
+    )
+    .unwrap();
     for command in ["render", "check"] {
-        bench
-            .run(&format!("{command} bad.toml"))
-            .code(2)
-            .stderr(says("error: bad.toml:").and(says("stel")).and(says("steel")));
+        bench.run(&format!("{command} bad.toml")).code(2).stderr(
+            says("error: bad.toml:")
+                .and(says("stel"))
+                .and(says("steel")),
+        );
     }
     fs::write(bench.path("empty.toml"), "").unwrap();
     bench.run("render empty.toml").code(2);
@@ -217,13 +222,31 @@ fn status_4_for_files_that_cannot_be_had() {
         ("check none.toml", "none.toml"),
         ("develop none.npz -o a.png", "none.npz"),
         ("merge out.npz none.npz", "none.npz"),
-        ("render box.toml --backend cpu --spp 1 -o none/a.exr", "none/a.exr"),
-        ("render box.toml --backend cpu --spp 1 --report none/r.json", "none/r.json"),
-        ("render box.toml --backend cpu --spp 1 --film none/f.npz", "none/f.npz"),
-        ("render box.toml --backend cpu --spp 1 --film folder", "folder"),
-        ("render box.toml --backend cpu --spp 1 --dump-wgsl folder", "folder"),
+        (
+            "render box.toml --backend cpu --spp 1 -o none/a.exr",
+            "none/a.exr",
+        ),
+        (
+            "render box.toml --backend cpu --spp 1 --report none/r.json",
+            "none/r.json",
+        ),
+        (
+            "render box.toml --backend cpu --spp 1 --film none/f.npz",
+            "none/f.npz",
+        ),
+        (
+            "render box.toml --backend cpu --spp 1 --film folder",
+            "folder",
+        ),
+        (
+            "render box.toml --backend cpu --spp 1 --dump-wgsl folder",
+            "folder",
+        ),
     ] {
-        bench.run(args).code(4).stderr(says("error: ").and(says(name)));
+        bench
+            .run(args)
+            .code(4)
+            .stderr(says("error: ").and(says(name)));
     }
     assert_eq!(bench.names(), ["box.toml", "folder"]);
 }
@@ -234,7 +257,10 @@ fn interrupted(bench: &Bench, signal: &str) -> Option<i32> {
     use std::process::{Command, Stdio};
     let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
         .current_dir(bench.dir.path())
-        .args("render box.toml --backend cpu --spp 4000000 --film f.npz --checkpoint 100ms".split(' '))
+        .args(
+            "render box.toml --backend cpu --spp 4000000 --film f.npz --checkpoint 100ms"
+                .split(' '),
+        )
         .args(["-o", "a.exr", "--report", "r.json", "--quiet"])
         .stdin(Stdio::null())
         .spawn()
@@ -264,7 +290,10 @@ fn status_130_and_143_after_saving_what_there_is() {
         let samples = bench.picture("a.exr").samples.expect("a samples layer");
         assert_eq!(u64::from(samples[0]), held.1);
         let report = fs::read_to_string(bench.path("r.json")).unwrap();
-        assert!(report.contains("\"stop_reason\": \"interrupted\""), "{report}");
+        assert!(
+            report.contains("\"stop_reason\": \"interrupted\""),
+            "{report}"
+        );
         assert_eq!(bench.names(), ["a.exr", "box.toml", "f.npz", "r.json"]);
     }
 }
@@ -274,8 +303,16 @@ fn status_130_and_143_after_saving_what_there_is() {
 #[test]
 fn help_and_version_are_data() {
     let bench = Bench::new();
-    bench.run("--version").success().stdout(says("etendue ")).stderr("");
-    bench.run("--help").success().stdout(says("Examples:")).stderr("");
+    bench
+        .run("--version")
+        .success()
+        .stdout(says("etendue "))
+        .stderr("");
+    bench
+        .run("--help")
+        .success()
+        .stdout(says("Examples:"))
+        .stderr("");
     bench
         .run("render --help")
         .success()
@@ -339,7 +376,10 @@ fn check_schema_and_adapters_print_data() {
     let done = bench.run("schema").success().stderr("");
     let schema: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
     assert!(schema["properties"]["camera"].is_object());
-    bench.run("adapters").success().stdout(says("CPU reference"));
+    bench
+        .run("adapters")
+        .success()
+        .stdout(says("CPU reference"));
 }
 
 #[test]
@@ -439,7 +479,11 @@ fn regions_have_the_bits_of_the_whole() {
     for i in 0..whole.rgb.len() {
         let (x, y) = (i % 24, i / 24);
         let there = (3..9).contains(&x) && (2..9).contains(&y) || (5..20).contains(&x) && y >= 5;
-        assert_eq!(part.alpha[i], f32::from(u8::from(there)), "alpha at {x}, {y}");
+        assert_eq!(
+            part.alpha[i],
+            f32::from(u8::from(there)),
+            "alpha at {x}, {y}"
+        );
         if there {
             inside += 1;
             let bits = |p: &Picture| p.rgb[i].map(f32::to_bits);
@@ -484,7 +528,9 @@ fn slices_merge_to_the_single_run_in_any_order() {
     let bench = Bench::new();
     bench.render("--spp 600 --film one.npz -o one.exr");
     for (name, range) in [("a", "0..256"), ("b", "256..512"), ("c", "512..600")] {
-        bench.render(&format!("--samples {range} --film {name}.npz -o {name}.exr"));
+        bench.render(&format!(
+            "--samples {range} --film {name}.npz -o {name}.exr"
+        ));
     }
     bench.run("merge whole.npz c.npz a.npz b.npz").success();
     bench.run("develop whole.npz -o whole.exr").success();
@@ -510,8 +556,13 @@ fn slices_merge_to_the_single_run_in_any_order() {
 fn quadrants_merge_to_the_whole() {
     let bench = Bench::new();
     let mut names = String::new();
-    for (i, region) in ["0,0,12,8", "12,0,24,8", "0,8,12,16", "12,8,24,16"].iter().enumerate() {
-        bench.render(&format!("--spp 20 --region {region} --film q{i}.npz -o q.png"));
+    for (i, region) in ["0,0,12,8", "12,0,24,8", "0,8,12,16", "12,8,24,16"]
+        .iter()
+        .enumerate()
+    {
+        bench.render(&format!(
+            "--spp 20 --region {region} --film q{i}.npz -o q.png"
+        ));
         names += &format!(" q{i}.npz");
     }
     bench.run(&format!("merge whole.npz{names}")).success();
@@ -527,8 +578,14 @@ fn merge_names_what_does_not_fit() {
     bench.render("--samples 4..12 --film b.npz -o a.png");
     bench.render("--samples 20..24 --film c.npz -o a.png");
     bench.render("--samples 8..12 --film d.npz -o a.png --seed 1");
-    bench.run("merge out.npz a.npz b.npz").code(2).stderr(says("b.npz"));
-    bench.run("merge out.npz a.npz d.npz").code(2).stderr(says("seed"));
+    bench
+        .run("merge out.npz a.npz b.npz")
+        .code(2)
+        .stderr(says("b.npz"));
+    bench
+        .run("merge out.npz a.npz d.npz")
+        .code(2)
+        .stderr(says("seed"));
     assert!(!bench.path("out.npz").exists());
     bench
         .run("merge out.npz a.npz c.npz")
@@ -554,7 +611,9 @@ fn a_film_of_something_else_is_refused_and_untouched() {
         ("--integrator whitted", "integrator"),
     ] {
         bench
-            .run(&format!("render box.toml --backend cpu --spp 8 --film f.npz {flags}"))
+            .run(&format!(
+                "render box.toml --backend cpu --spp 8 --film f.npz {flags}"
+            ))
             .code(2)
             .stderr(says("f.npz").and(says(what)));
     }

@@ -53,7 +53,7 @@ mod tests {
         check(512 * 384).unwrap();
         if available().is_some() {
             let message = check(1 << 40).unwrap_err().to_string();
-            assert!(message.contains("255086.6 GB"), "{message}");
+            assert!(message.contains("255086.7 GB"), "{message}");
         }
     }
 

@@ -121,19 +121,25 @@ fn end_for_pixel(wanted: u64, ranges: &[Range<u64>]) -> u64 {
     at + lacking
 }
 
+/// `1 sample a pixel`, `2 samples a pixel`.
+pub fn count(samples: u64) -> String {
+    let s = if samples == 1 { "" } else { "s" };
+    format!("{samples} sample{s} a pixel")
+}
+
 /// What will end the run, for the start-up line.
 pub fn ends(args: &RenderArgs, samples: &Range<u64>) -> String {
     let mut conditions = Vec::new();
     if let Some(range) = &args.samples {
         conditions.push(format!("samples {}..{} are done", range.start, range.end));
     } else if samples.end < MAX_SAMPLES {
-        conditions.push(format!("{} samples a pixel", samples.end));
+        conditions.push(count(samples.end));
     }
     if let Some(error) = args.error {
         conditions.push(format!("relative error {}", percent(error)));
     }
     if let Some(time) = args.time {
-        conditions.push(clock(time.as_secs_f64()));
+        conditions.push(format!("{} of rendering", clock(time.as_secs_f64())));
     }
     format!("until {}", conditions.join(", or "))
 }
@@ -149,20 +155,20 @@ mod tests {
     #[test]
     fn what_a_film_holds_counts() {
         let whole = rect(0, 0, 4, 4);
-        let end = |held: &[Range<u64>], wanted| {
+        let end = |held: &[(u64, u64)], wanted| {
             let mut c = Coverage::default();
-            for r in held {
-                c.add(whole, r.clone());
+            for &(a, b) in held {
+                c.add(whole, a..b);
             }
             end_for(wanted, &[whole], &c)
         };
         assert_eq!(end(&[], 100), 100);
-        assert_eq!(end(&[0..40], 100), 100);
-        assert_eq!(end(&[512..1024], 512), 0);
-        assert_eq!(end(&[512..1024], 600), 88);
-        assert_eq!(end(&[10..20, 30..40], 35), 25);
-        assert_eq!(end(&[10..20], 10), 0);
-        assert_eq!(end(&[10..20, 30..40], 45), 45);
+        assert_eq!(end(&[(0, 40)], 100), 100);
+        assert_eq!(end(&[(512, 1024)], 512), 0);
+        assert_eq!(end(&[(512, 1024)], 600), 88);
+        assert_eq!(end(&[(10, 20), (30, 40)], 35), 25);
+        assert_eq!(end(&[(10, 20)], 10), 0);
+        assert_eq!(end(&[(10, 20), (30, 40)], 45), 45);
     }
 
     #[test]

@@ -243,8 +243,8 @@ fn say_start(
 /// `120 samples a pixel`, or `119 to 120`.
 fn samples_text(film: &Film) -> String {
     match film.coverage.samples() {
-        (a, b) if a == b => format!("{a} samples a pixel"),
-        (a, b) => format!("{a} to {b} samples a pixel"),
+        (a, b) if a == b => plan::count(a),
+        (a, b) => format!("{a} to {}", plan::count(b)),
     }
 }
 
