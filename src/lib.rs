@@ -9,6 +9,8 @@
 
 pub mod engine;
 pub mod film;
+pub mod gpu;
+pub mod kernel;
 pub mod output;
 pub mod provenance;
 pub mod reference;

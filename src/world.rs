@@ -16,6 +16,7 @@
 
 use crate::scene::{Bsdf, Scene, Shape};
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// The medium outside every dielectric solid.
 pub const AIR: u32 = 0;
@@ -80,8 +81,8 @@ pub struct WorldPrimitive {
     pub solid: u32,
     /// The solid just outside `solid`.
     pub parent: u32,
-    /// Identity of its faces (cylinder: side, base cap, top cap; others use the first). Coincident
-    /// planar faces share one; never 0.
+    /// Identity of its faces (cylinder: side, base cap, top cap; others use the first): [`face`] of
+    /// its key, or of the key of the first of the planar faces that coincide; never 0.
     pub faces: [u32; 3],
     /// Line in the scene file.
     pub line: usize,
@@ -122,6 +123,16 @@ pub struct WorldCamera {
     pub dy: DVec3,
     /// The dielectric solid that holds the eye.
     pub medium: u32,
+}
+
+/// The key of part `part` of surface number `number`: lights come first, then the primitives.
+pub fn key(number: usize, part: usize) -> u32 {
+    (4 * number + part) as u32
+}
+
+/// The identity of the face with this key, if nothing that is met earlier coincides with it; 0 is no face.
+pub fn face(key: u32) -> u32 {
+    key + 1
 }
 
 /// The scene, ready for rays.
@@ -182,6 +193,7 @@ impl World {
         let medium = medium_at(&primitives, eye);
         scale_radiance(&mut lights, &primitives, &materials, medium);
         find_huge_spheres(&mut primitives, &lights, eye);
+        name_faces(&mut lights, &mut primitives);
 
         let forward = (scene.camera.look_at - scene.camera.eye).normalize();
         let right = forward.cross(scene.camera.up.normalize()).normalize();
@@ -489,7 +501,7 @@ fn settle_sides(primitives: &mut [WorldPrimitive], materials: &[Bsdf], eye: DVec
     }
 }
 
-/// A point well inside a solid, and its volume (half-spaces: the larger the further they reach).
+/// A point well inside a solid, and its volume.
 fn core_of(g: &Geometry) -> (DVec3, f64) {
     match *g {
         Geometry::Sphere { center, radius } => {
@@ -507,9 +519,28 @@ fn core_of(g: &Geometry) -> (DVec3, f64) {
                 radius * radius * length * std::f64::consts::PI,
             )
         }
-        Geometry::Plane { normal, offset } => (normal * (offset - 1e12), f64::INFINITY),
+        Geometry::Plane { normal, offset } => (normal * offset, f64::INFINITY),
         Geometry::HugeSphere { .. } | Geometry::Disk { .. } => (DVec3::ZERO, 0.0),
     }
+}
+
+/// Whether solid `outer` holds solid `inner`; of two equal ones the `first` in the file is the outer.
+fn encloses(outer: &Geometry, inner: &Geometry, first: bool) -> bool {
+    if let (
+        Geometry::Plane { normal, offset },
+        Geometry::Plane {
+            normal: n,
+            offset: o,
+        },
+    ) = (outer, inner)
+    {
+        // Half-spaces that are not parallel cross, and neither holds the other.
+        let parallel = normal.cross(*n).length() <= COINCIDENT && normal.dot(*n) > 0.0;
+        return parallel && (offset > o || (offset == o && first));
+    }
+    let (core, volume) = core_of(inner);
+    let larger = core_of(outer).1;
+    inside(outer, core) && (larger > volume || (larger == volume && first))
 }
 
 /// Numbers the dielectric solids from 1, and finds the one just outside each.
@@ -520,20 +551,18 @@ fn number_solids(primitives: &mut [WorldPrimitive], materials: &[Bsdf]) {
     for (k, &i) in solids.iter().enumerate() {
         primitives[i].solid = k as u32 + 1;
     }
+    let around: Vec<Vec<usize>> = (0..solids.len())
+        .map(|k| {
+            let inner = &primitives[solids[k]].geometry;
+            (0..solids.len())
+                .filter(|&m| m != k && encloses(&primitives[solids[m]].geometry, inner, m < k))
+                .collect()
+        })
+        .collect();
     for (k, &i) in solids.iter().enumerate() {
-        let (core, volume) = core_of(&primitives[i].geometry);
-        let around = solids.iter().enumerate().filter(|&(m, &j)| {
-            let other = core_of(&primitives[j].geometry).1;
-            // Of two equal solids the first in the file is met first: it is outside.
-            j != i
-                && inside(&primitives[j].geometry, core)
-                && (other > volume || (other == volume && m < k))
-        });
-        let smallest = around.min_by(|a, b| {
-            let v = |j: usize| core_of(&primitives[j].geometry).1;
-            v(*a.1).total_cmp(&v(*b.1)).then(b.0.cmp(&a.0))
-        });
-        primitives[i].parent = smallest.map_or(AIR, |(_, &j)| primitives[j].solid);
+        // Those around it lie in each other like the skins of an onion: the innermost has the most around it.
+        let innermost = around[k].iter().max_by_key(|&&m| around[m].len());
+        primitives[i].parent = innermost.map_or(AIR, |&m| primitives[solids[m]].solid);
     }
 }
 
@@ -631,6 +660,24 @@ fn scale_radiance(
         let n_light = index_of(primitives, materials, medium_at(primitives, before));
         if n_light != n_eye {
             l.radiance *= (n_eye / n_light).powi(2);
+        }
+    }
+}
+
+/// Replaces the identities of faces by the keys of those that are met first.
+fn name_faces(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
+    let mut names = HashMap::new();
+    let first = lights.len();
+    for (i, l) in lights.iter_mut().enumerate() {
+        l.face = *names.entry(l.face).or_insert(face(key(i, 0)));
+    }
+    for (i, p) in primitives.iter_mut().enumerate() {
+        for part in 0..if matches!(p.geometry, Geometry::Cylinder { .. }) {
+            3
+        } else {
+            1
+        } {
+            p.faces[part] = *names.entry(p.faces[part]).or_insert(face(key(first + i, part)));
         }
     }
 }

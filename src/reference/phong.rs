@@ -89,6 +89,7 @@ mod tests {
     use crate::reference::brute_force::random_direction;
     use crate::reference::chi_square::{assert_density, mean_and_error};
     use crate::reference::sampler::Sampler;
+    use std::f64::consts::FRAC_1_PI;
 
     fn gloss(kd: f64, ks: f64, exponent: f64) -> Phong {
         Phong {
@@ -183,7 +184,7 @@ mod tests {
     fn albedo_in_a_white_furnace() {
         // Rows: exponent, then albedo at 0, 30, 60, 85, 90 degrees for ks = 1; from quadrature.
         let table = [
-            (1.0, [1.0, 0.88084, 0.60900, 0.36310, 0.31831]),
+            (1.0, [1.0, 0.88084, 0.60900, 0.36310, FRAC_1_PI]),
             (10.0, [1.0, 0.86603, 0.50474, 0.17127, 0.12305]),
             (50.0, [1.0, 0.86603, 0.50000, 0.11006, 0.05614]),
             (1000.0, [1.0, 0.86603, 0.50000, 0.08718, 0.01261]),

@@ -1,1 +1,245 @@
-//! Lints
+//! Lints: what a scene may say, but its author probably did not mean.
+
+mod coincide;
+mod cross;
+mod eye;
+mod geometry;
+mod lights;
+mod open;
+
+use super::source::quoted;
+use super::{Bsdf, Diagnostic, Primitive, Scene};
+use glam::DVec3;
+
+/// Scenes with more primitives and lights than this are not searched for things that go wrong
+/// between two of them: that takes time in proportion to the square of their number.
+pub const MAX_PAIRWISE: usize = 2000;
+
+/// Warnings of one kind that are written out; the rest are counted.
+pub const MAX_ALIKE: usize = 10;
+
+/// Surfaces closer than this, relative to their size, coincide.
+const COINCIDENT: f64 = crate::world::COINCIDENT;
+
+/// Warnings of one kind.
+#[derive(Default)]
+struct Warnings {
+    /// The first [`MAX_ALIKE`]: line in the scene file, 0 for the whole file, and message.
+    first: Vec<(usize, String)>,
+    /// How many there are besides.
+    more: usize,
+}
+
+impl Warnings {
+    fn add(&mut self, line: usize, message: impl FnOnce() -> String) {
+        if self.first.len() < MAX_ALIKE {
+            self.first.push((line, message()));
+        } else {
+            self.more += 1;
+        }
+    }
+}
+
+/// Warnings about what is legal but suspect, in no particular severity; empty for most scenes.
+///
+/// A closed room of opaque walls, with things that stand on its floor and lamps flush on its
+/// ceiling, has none.
+pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
+    let mut kinds = vec![materials(scene)];
+    let things = scene.primitives.len() + scene.lights.len();
+    if things <= MAX_PAIRWISE {
+        kinds.push(coincide::warnings(scene));
+        kinds.push(cross::warnings(scene));
+        kinds.push(lights::covered(scene));
+        kinds.push(lights::unseen(scene));
+    } else {
+        let mut skipped = Warnings::default();
+        skipped.add(0, || {
+            format!(
+                "{things} primitives and lights: with more than {MAX_PAIRWISE} they are not \
+                 searched for surfaces that coincide or cross, or hide a light"
+            )
+        });
+        kinds.push(skipped);
+    }
+    kinds.push(lights::black(scene));
+    kinds.push(eye::warnings(scene));
+    kinds.push(open::warnings(scene));
+
+    let mut diagnostics = Vec::new();
+    for Warnings { first, more } in kinds {
+        let counted = (more > 0).then(|| (0, format!("{more} more warnings like the last")));
+        let all = first.into_iter().chain(counted);
+        diagnostics.extend(all.map(|(line, message)| Diagnostic {
+            path: scene.path.clone(),
+            line,
+            column: 0,
+            message,
+        }));
+    }
+    diagnostics
+}
+
+/// Materials that do nothing.
+fn materials(scene: &Scene) -> Warnings {
+    let mut users = vec![None; scene.materials.len()];
+    for p in &scene.primitives {
+        users[p.material].get_or_insert(p.line);
+    }
+    let mut warnings = Warnings::default();
+    for (material, user) in scene.materials.iter().zip(users) {
+        let name = quoted(&material.name);
+        match (user, material.bsdf) {
+            (None, _) => warnings.add(0, || format!("material {name} is used by nothing")),
+            (
+                Some(line),
+                Bsdf::Dielectric {
+                    ior: 1.0,
+                    transmittance,
+                },
+            ) => {
+                let effect = if transmittance == DVec3::ONE {
+                    "is invisible"
+                } else {
+                    "only tints"
+                };
+                warnings.add(line, || {
+                    format!("material {name} has ior 1: it does not bend light and {effect}")
+                });
+            }
+            _ => {}
+        }
+    }
+    warnings
+}
+
+fn is_dielectric(scene: &Scene, p: &Primitive) -> bool {
+    matches!(scene.materials[p.material].bsdf, Bsdf::Dielectric { .. })
+}
+
+/// "the sphere at line 12", or without the line for a scene made in memory.
+fn called(kind: &str, line: usize) -> String {
+    if line > 0 {
+        format!("the {kind} at line {line}")
+    } else {
+        format!("the {kind}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::parse::parse_str;
+    use std::path::Path;
+
+    /// A camera, a light and three materials, to which each test adds what it is about.
+    const STAGE: &str = "\
+[camera]
+eye = [0, 1, 4]
+look_at = [0, 1, 0]
+vfov = 40
+resolution = [64, 48]
+[material.white]
+type = 'diffuse'
+reflectance = [0.7, 0.7, 0.7]
+[material.red]
+type = 'diffuse'
+reflectance = [0.7, 0.1, 0.1]
+[material.glass]
+type = 'dielectric'
+[[light]]
+center = [0, 4, 0]
+normal = [0, -1, 0]
+radius = 0.5
+radiance = [9, 9, 9]
+";
+
+    pub(super) fn with(text: &str) -> String {
+        format!("{STAGE}{text}")
+    }
+
+    pub(super) fn scene(text: &str) -> Scene {
+        match parse_str(Path::new("test.toml"), &with(text)) {
+            Ok(scene) => scene,
+            Err(errors) => panic!("{}", errors[0]),
+        }
+    }
+
+    /// Whether any warning about the stage with `text` has `phrase` in it.
+    pub(super) fn warned(text: &str, phrase: &str) -> bool {
+        let warnings = lint(&scene(text));
+        warnings.iter().any(|w| w.to_string().contains(phrase))
+    }
+
+    fn room() -> String {
+        let walls = [
+            ("[0,0,0]", "[0,1,0]"),
+            ("[0,4,0]", "[0,-1,0]"),
+            ("[-3,0,0]", "[1,0,0]"),
+            ("[3,0,0]", "[1,0,0]"),
+            ("[0,0,-3]", "[0,0,1]"),
+            ("[0,0,9]", "[0,0,1]"),
+        ];
+        let plane = |(point, normal): &(&str, &str)| {
+            format!("[[plane]]\npoint = {point}\nnormal = {normal}\nmaterial = 'white'\n")
+        };
+        walls.iter().map(plane).collect()
+    }
+
+    #[test]
+    fn an_ordinary_room_has_no_warnings() {
+        let text = room()
+            + "[[sphere]]\ncenter = [1,0.5,0]\nradius = 0.5\nmaterial = 'glass'\n\
+               [[cylinder]]\nbase = [-1,0,0]\ntop = [-1,1,0]\nradius = 0.3\nmaterial = 'glass'\n\
+               [[disk]]\ncenter = [0,1,-3]\nnormal = [0,0,1]\nradius = 0.5\nmaterial = 'red'\n";
+        assert_eq!(lint(&scene(&text)), []);
+    }
+
+    #[test]
+    fn idle_materials() {
+        assert!(warned(&room(), "material \"glass\" is used by nothing"));
+        assert!(!warned(&room(), "material \"white\""));
+        let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'ghost'\n";
+        let ghost = |keys: &str| format!("{ball}[material.ghost]\ntype = 'dielectric'\n{keys}\n");
+        assert!(warned(
+            &ghost("ior = 1"),
+            "has ior 1: it does not bend light and is invisible"
+        ));
+        assert!(warned(
+            &ghost("ior = 1.0\ntransmittance = [1,0.9,1]"),
+            "and only tints"
+        ));
+        assert!(!warned(&ghost("ior = 1.0001"), "ior 1"));
+    }
+
+    #[test]
+    fn many_warnings_of_a_kind_are_counted() {
+        let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'red'\n";
+        // Six spheres in one place are fifteen pairs.
+        let text = ball.repeat(6);
+        assert!(warned(&text, "5 more warnings like the last"));
+        assert!(!warned(&ball.repeat(5), "more warnings"));
+    }
+
+    #[test]
+    fn large_scenes_are_not_searched_for_pairs() {
+        let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'red'\n";
+        let skipped = "2001 primitives and lights: with more than 2000";
+        let large = ball.repeat(MAX_PAIRWISE);
+        assert!(warned(&large, skipped) && !warned(&large, "coincides with"));
+        let largest_searched = ball.repeat(MAX_PAIRWISE - 1);
+        assert!(!warned(&largest_searched, "are not searched"));
+    }
+
+    #[test]
+    fn scenes_made_in_memory_have_no_lines() {
+        let mut scene =
+            scene(&"[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'red'\n".repeat(2));
+        for p in &mut scene.primitives {
+            p.line = 0;
+        }
+        let messages: Vec<String> = lint(&scene).iter().map(|w| w.message.clone()).collect();
+        let expected = "the sphere coincides with the sphere, which is met first from either side";
+        assert!(messages.iter().any(|m| m == expected), "{messages:?}");
+    }
+}

@@ -1,11 +1,15 @@
 //! The scene as its author wrote it: f64, the file's own units and order.
 //!
-//! [`parse`] reads it from TOML, [`check`] finds what is legal but suspect, and
-//! [`World::new`](crate::world::World::new) makes it ready for rays.
+//! [`parse`] reads it from TOML, [`schema`] describes that TOML to editors, [`check`] finds what is
+//! legal but suspect, and [`World::new`](crate::world::World::new) makes it ready for rays.
 
 pub mod check;
+mod format;
 pub mod hash;
 pub mod parse;
+pub mod schema;
+mod source;
+mod value;
 
 use glam::DVec3;
 use std::fmt;

@@ -1,0 +1,94 @@
+// Capped cylinders as the common part of an infinite cylinder and the slab between the caps: the interval
+// of the ray inside one intersected with that inside the other, which makes the rim watertight
+// [Cychosz1994]. In the plane across the axis, A = |d|^2, B = m.d, and the discriminant is
+// A (r + |w|)(r - |w|) with w the nearest point to the axis, which keeps its precision near tangents.
+
+// Parts of a cylinder's key.
+const CYLINDER_SIDE: u32 = 0u;
+const CYLINDER_BASE: u32 = 1u;
+const CYLINDER_TOP: u32 = 2u;
+
+// Below this squared sine to the axis a ray runs along it: only the caps can be met.
+const ALONG_AXIS: f32 = 1.0e-12;
+
+struct Cylinder {
+    base: vec3f,
+    radius: f32,
+    axis: vec3f,
+    // axis . p on the planes of the two caps.
+    offsets: vec2f,
+}
+
+// Where a ray is inside the cylinder, and through which part it enters and leaves.
+struct Span {
+    enter: f32,
+    leave: f32,
+    enter_part: u32,
+    leave_part: u32,
+    // The ray meets the infinite cylinder at all.
+    crosses: bool,
+}
+
+fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span {
+    // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0.
+    let along = dot(c.axis, ray.d);
+    let up = along > 0.0;
+    let cos = select(min(along, -1.0e-20), max(along, 1.0e-20), up);
+    let height = dot(c.axis, ray.o);
+    let at_base = select((c.offsets.x - height) / cos, 0.0, ray.face == base);
+    let at_top = select((c.offsets.y - height) / cos, 0.0, ray.face == top);
+    let slab_enter = select(at_top, at_base, up);
+    let slab_leave = select(at_base, at_top, up);
+
+    // The infinite cylinder.
+    let from_base = ray.o - c.base;
+    let m = from_base - c.axis * dot(c.axis, from_base);
+    let d = ray.d - c.axis * along;
+    let a = dot(d, d);
+    let b = dot(m, d);
+    let parallel = a < ALONG_AXIS;
+    let inv_a = 1.0 / max(a, ALONG_AXIS);
+    let w = length(m - d * (b * inv_a));
+    let distance = length(m);
+    let excess = (distance + c.radius) * (distance - c.radius);
+    let disc = a * (c.radius + w) * (c.radius - w);
+    let root = safe_sqrt(disc);
+    let q = -(b + select(-root, root, b >= 0.0));
+    let first = q * inv_a;
+    let second = select(excess / q, first, q == 0.0);
+    // Standing on the side, one root is 0 and the other is known without it.
+    let on_side = ray.face == side;
+    let other = -2.0 * b * inv_a;
+    let near = select(select(min(first, second), min(other, 0.0), on_side), -FAR, parallel);
+    let far = select(select(max(first, second), max(other, 0.0), on_side), FAR, parallel);
+
+    return Span(
+        max(slab_enter, near),
+        min(slab_leave, far),
+        select(CYLINDER_SIDE, select(CYLINDER_TOP, CYLINDER_BASE, up), slab_enter >= near),
+        select(CYLINDER_SIDE, select(CYLINDER_BASE, CYLINDER_TOP, up), slab_leave < far),
+        select(disc >= 0.0, distance <= c.radius, parallel),
+    );
+}
+
+// For a ray known to be outside.
+fn cylinder_outside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
+    let s = cylinder_span(ray, c, side, base, top);
+    let met = s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
+    return nearer(hit, met, max(s.enter, 0.0), key + s.enter_part);
+}
+
+// For a ray known to be inside.
+fn cylinder_inside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
+    let s = cylinder_span(ray, c, side, base, top);
+    return nearer(hit, true, max(s.leave, 0.0), key + s.leave_part);
+}
+
+// The boundary of dielectric solid `solid` inside `parent`.
+fn cylinder_boundary(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32, solid: u32, parent: u32) -> Hit {
+    let s = cylinder_span(ray, c, side, base, top);
+    let inside = ray.medium == solid;
+    let enters = ray.medium == parent && s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
+    let t = max(select(s.enter, s.leave, inside), 0.0);
+    return nearer(hit, inside || enters, t, key + select(s.enter_part, s.leave_part, inside));
+}

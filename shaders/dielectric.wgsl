@@ -1,0 +1,24 @@
+// Smooth dielectric boundary: the unpolarised Fresnel equations and Snell's law.
+
+struct Refraction {
+    // Share of the light that is transmitted; 0 under total internal reflection.
+    transmitted: f32,
+    // Cosine of the refracted ray to the normal.
+    cos_t: f32,
+}
+
+// For a ray that meets the boundary at cosine cos_i > 0; eta is the index ahead over the index behind.
+// Transmission is computed itself, for 1 - reflection would cancel near grazing.
+fn refraction(cos_i: f32, eta: f32) -> Refraction {
+    let cos2_t = 1.0 - (1.0 - cos_i) * (1.0 + cos_i) / (eta * eta);
+    let cos_t = safe_sqrt(cos2_t);
+    let s = cos_i + eta * cos_t;
+    let p = eta * cos_i + cos_t;
+    let t = 2.0 * eta * cos_i * cos_t * (1.0 / (s * s) + 1.0 / (p * p));
+    return Refraction(select(0.0, t, cos2_t > 0.0), cos_t);
+}
+
+// The refracted direction of d at unit normal n, which faces the ray.
+fn refracted(d: vec3f, n: vec3f, cos_i: f32, cos_t: f32, eta: f32) -> vec3f {
+    return normalize(d / eta + n * (cos_i / eta - cos_t));
+}

@@ -1,0 +1,323 @@
+// The path loop: every invocation takes one pixel through a range of samples of one replicate.
+
+struct Params {
+    // Top left pixel of the tile, and its width and height.
+    tile: vec2u,
+    size: vec2u,
+    // Range of indices among the replicate's samples.
+    first: u32,
+    end: u32,
+    replicate: u32,
+    // 1: the running sums start at zero.
+    fresh: u32,
+    seed: u32,
+    // Workgroups, and a stride without a common divisor: consecutive groups go far apart, so that a driver
+    // which hands each thread a contiguous share gives all of them the same picture to do.
+    groups: u32,
+    stride: u32,
+}
+
+@group(0) @binding(0) var<storage, read> surfaces: array<Surface>;
+@group(0) @binding(1) var<storage, read> materials: array<Material>;
+@group(0) @binding(2) var<storage, read> lights: array<DiskLight>;
+
+@group(1) @binding(0) var<uniform> params: Params;
+// Running sums of the block, a layer for each replicate: R, G, B, squared luminance.
+@group(1) @binding(1) var running_in: texture_2d_array<f32>;
+@group(1) @binding(2) var running_out: texture_storage_2d_array<rgba32float, write>;
+// For each pixel of the tile: rays, truncated paths, non-finite samples, 1 + number of the first of those.
+@group(1) @binding(3) var<storage, read_write> counters: array<vec4u>;
+
+struct Path {
+    ray: Ray,
+    // Product of the sample weights so far.
+    beta: vec3f,
+    // Radiance gathered so far.
+    radiance: vec3f,
+    // Number of the vertex that `ray` will meet; the first has 1.
+    depth: u32,
+    // The last scattering was specular (or there was none): light met by chance counts whole.
+    specular: bool,
+#if MIS
+    // Density of the last scattering, per solid angle; 0: light met by chance is all counted by light sampling.
+    pdf: f32,
+#if SEVERAL_LIGHTS
+    // Normal there, and the sum of the light weights.
+    n: vec3f,
+    weights: f32,
+#endif
+#endif
+#if WHITTED
+    // Only a light counts from here on.
+    ending: bool,
+#endif
+}
+
+// Number of the i-th sample of a replicate, which owns every REPLICATES-th round.
+fn sample_number(i: u32, replicate: u32) -> u32 {
+    return (i / ROUND_SAMPLES * REPLICATES + replicate) * ROUND_SAMPLES + i % ROUND_SAMPLES;
+}
+
+fn begin(pixel: vec2u, key: u32, s: u32) -> Path {
+    var path: Path;
+    path.ray = camera_ray(pixel, film_position(key, s, params.seed));
+    path.beta = vec3f(1.0);
+    path.radiance = vec3f(0.0);
+    path.depth = 1u;
+    path.specular = true;
+    return path;
+}
+
+// Whether light scattered this often on its way to the eye is kept.
+fn kept(scatterings: u32) -> bool {
+#if ALL_LIGHT
+    return true;
+#else
+    return (KEEP_EMITTED && scatterings == 0u) || (KEEP_DIRECT && scatterings == 1u) || (KEEP_INDIRECT && scatterings >= 2u);
+#endif
+}
+
+#if MIS
+// Power heuristic [Veach1995]: the share of a sample with density a, where b would find it too.
+fn power_heuristic(a: f32, b: f32) -> f32 {
+    // The ratio first: squares of large densities overflow.
+    let r = b / max(a, TINY);
+    return 1.0 / (1.0 + r * r);
+}
+#endif
+
+@compute @workgroup_size(64)
+fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let index = group.x * params.stride % params.groups * 64u + lane;
+    if index >= params.size.x * params.size.y {
+        return;
+    }
+    let texel = vec2u(index % params.size.x, index / params.size.x);
+    let pixel = params.tile + texel;
+    let key = pixel.x | (pixel.y << 16u);
+
+    var sum = vec4f(0.0);
+    if params.fresh == 0u {
+        sum = textureLoad(running_in, texel, params.replicate, 0);
+    }
+    var count = counters[index];
+
+    var i = params.first;
+    var s = sample_number(i, params.replicate);
+    var path = begin(pixel, key, s);
+    // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
+    while i < params.end {
+        var alive = false;
+        let hit = intersect(path.ray);
+        count.x += 1u;
+
+        if hit.key < LIGHT_KEYS {
+            // A light ends the path.
+            path.radiance += path.beta * emission(path, hit);
+        } else if hit.key != NONE {
+            alive = scatter_at(&path, hit, vec4u(key, s, path.depth, params.seed), &count);
+        }
+
+        if !alive {
+            // Add the sample, and start the next at once: no lane waits for a longer path.
+            let l = path.radiance;
+            let y = dot(l, vec3f(0.2126, 0.7152, 0.0722));
+            // WGSL may assume that there is no NaN: look at the bits.
+            let finite = (bitcast<u32>(y) & 0x7fffffffu) < 0x7f800000u;
+            if finite {
+                sum += vec4f(l, y * y);
+            } else {
+                count.w = select(count.w, s + 1u, count.z == 0u);
+                count.z += 1u;
+            }
+            i += 1u;
+            s = sample_number(i, params.replicate);
+            path = begin(pixel, key, s);
+        }
+    }
+    textureStore(running_out, texel, params.replicate, sum);
+    counters[index] = count;
+}
+
+// What a light met by chance adds, before the path's weight.
+fn emission(path: Path, hit: Hit) -> vec3f {
+    let light = light_at(hit.key >> 2u);
+    let front = dot(path.ray.d, light.normal) < 0.0;
+    var share = select(0.0, 1.0, front && kept(path.depth - 1u));
+#if LIGHT_SAMPLING
+#if MIS
+    if !path.specular {
+        let cap = cap_of(light, path.ray.o);
+        var pdf = cap_pdf(light, cap, path.ray.d);
+#if SEVERAL_LIGHTS
+        pdf *= light_weight(light, cap, path.n) / path.weights;
+#endif
+        share *= select(0.0, power_heuristic(path.pdf, SHADOW_RAYS * pdf), path.pdf > 0.0);
+    }
+#else
+    share *= select(0.0, 1.0, path.specular);
+#endif
+#endif
+    return light.radiance * share;
+}
+
+// Scatters the path where it met a surface: direct light, then a new direction. False when it ends.
+fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<function, vec4u>) -> bool {
+    let surface = surface_at(hit.key);
+    let material = material_at(surface.material);
+    let d = (*path).ray.d;
+    let v = vertex_at((*path).ray, hit, surface);
+    let face = face_at(hit.key, surface);
+    // Two-sided: the normal on the side that the ray comes from.
+    let outside = dot(v.n, d) < 0.0;
+    let n = select(-v.n, v.n, outside);
+    let cos_i = abs(dot(v.n, d));
+
+    // The vertex on the light counts too, so nothing can be gathered beyond the last one.
+    if (*path).depth >= LAST_DEPTH {
+#if COUNT_TRUNCATED
+        (*count).y += 1u;
+#endif
+        return false;
+    }
+#if WHITTED
+    if (*path).ending {
+        return false;
+    }
+#endif
+    let u = draw(draw_key);
+
+#if LIGHT_SAMPLING
+    // Direct light, where the surface scatters into more than one direction.
+    var weights = 0.0;
+    if material.kind == MATERIAL_DIFFUSE || material.kind == MATERIAL_PHONG {
+        var gathered = vec3f(0.0);
+#if SEVERAL_SHADOW_RAYS
+        for (var k = 0u; k < u32(SHADOW_RAYS); k++) {
+            var points = u.points.xy;
+            var choice = u.choices.x;
+            if k > 0u {
+                let more = draw(draw_key + vec4u(0u, 0u, k << 20u, 0u));
+                points = more.points.xy;
+                choice = more.choices.x;
+            }
+            choice = (choice + f32(k)) * (1.0 / SHADOW_RAYS);
+#else
+            let points = u.points.xy;
+            let choice = u.choices.x;
+#endif
+            let chosen = choose_light(v.p, n, choice);
+            weights = chosen.weights;
+            let to = sample_cap(chosen.light, chosen.cap, points);
+            let cos = dot(n, to.d);
+            let pdf = to.pdf * chosen.probability;
+            if cos > 0.0 && pdf > 0.0 && kept((*path).depth) {
+                var f_cos = material.color * (0.31830989 * cos);
+#if PHONG
+                if material.kind == MATERIAL_PHONG {
+                    let power = phong_power(to.d, mirrored(d, n), material.exponent);
+                    let value = phong_value(material.color, material.specular, material.exponent, cos, power);
+                    f_cos = value.f_cos;
+#if MIS
+                    f_cos *= power_heuristic(SHADOW_RAYS * pdf, value.pdf);
+#endif
+                }
+#endif
+                (*count).x += 1u;
+                let shadow = Ray(v.p, to.d, face, (*path).ray.medium, chosen.light.face);
+                if !occluded(shadow, to.distance) {
+                    gathered += f_cos * chosen.light.radiance * (1.0 / (pdf * SHADOW_RAYS));
+                }
+            }
+#if SEVERAL_SHADOW_RAYS
+        }
+#endif
+        (*path).radiance += (*path).beta * gathered;
+#if WHITTED
+        (*path).ending = true;
+#endif
+    }
+#endif
+
+    // A new direction.
+    var next = d;
+    var weight = vec3f(0.0);
+    var medium = (*path).ray.medium;
+    (*path).specular = false;
+#if MIS
+    (*path).pdf = 0.0;
+#endif
+#if DIFFUSE
+    if material.kind == MATERIAL_DIFFUSE {
+        next = sample_cosine(n, u.points.zw);
+        weight = material.color;
+    }
+#endif
+#if PHONG
+    if material.kind == MATERIAL_PHONG {
+        let r = mirrored(d, n);
+        let choice = lobe_probability(material.color, material.specular);
+        var power: f32;
+        if u.choices.y < choice {
+            let lobe = sample_lobe(r, material.exponent, u.points.zw);
+            next = lobe.d;
+            power = lobe.power;
+        } else {
+            next = sample_cosine(n, u.points.zw);
+            power = phong_power(next, r, material.exponent);
+        }
+        let cos = dot(n, next);
+        let value = phong_value(material.color, material.specular, material.exponent, cos, power);
+        // Below the horizon the sample counts as zero and is not drawn again. Where there is no diffuse part the
+        // powers cancel, and nothing is left to divide.
+        var quotient = value.f_cos / max(value.pdf, TINY);
+        if choice >= 1.0 {
+            quotient = material.specular * ((material.exponent + 2.0) / (material.exponent + 1.0) * cos);
+        }
+        weight = select(vec3f(0.0), quotient, cos > 0.0);
+#if MIS
+        (*path).pdf = value.pdf;
+#endif
+    }
+#endif
+#if MIRROR
+    if material.kind == MATERIAL_MIRROR {
+        next = mirrored(d, n);
+        weight = material.color;
+        (*path).specular = true;
+    }
+#endif
+#if DIELECTRIC
+    if material.kind == MATERIAL_DIELECTRIC {
+        let eta = select(1.0 / material.exponent, material.exponent, outside);
+        let fresnel = refraction(cos_i, eta);
+        if u.choices.y < fresnel.transmitted {
+            next = refracted(d, n, cos_i, fresnel.cos_t, eta);
+            weight = material.color;
+            medium = select(surface.parent, surface.solid, outside);
+        } else {
+            next = mirrored(d, n);
+            weight = vec3f(1.0);
+        }
+        (*path).specular = true;
+    }
+#endif
+
+    let beta = (*path).beta * weight;
+    (*path).ray = Ray(v.p, next, face, medium, NO_FACE);
+#if MIS
+#if SEVERAL_LIGHTS
+    (*path).n = n;
+    (*path).weights = weights;
+#endif
+#endif
+    // Russian roulette: short paths are cheap, and cutting them only adds noise.
+    let brightest = max(max(beta.x, beta.y), beta.z);
+    var survival = 1.0;
+    if (*path).depth >= ROULETTE_DEPTH {
+        survival = min(1.0, brightest);
+    }
+    (*path).beta = beta / max(survival, TINY);
+    (*path).depth += 1u;
+    return brightest > 0.0 && u.choices.z < survival;
+}

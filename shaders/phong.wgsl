@@ -1,0 +1,55 @@
+// The modified Phong model [Lafortune1994]: f = kd / pi + ks (n + 2) / (2 pi) cos^n(alpha), alpha the angle to
+// the mirror direction; the lobe is zero where cos(alpha) <= 0 and below the surface.
+
+// cos^n(alpha) between unit vectors w and r. At large n a power of the cosine would lose its digits
+// to rounding near 1, so the angle is taken from the difference of the vectors.
+fn phong_power(w: vec3f, r: vec3f, exponent: f32) -> f32 {
+    let diff = w - r;
+    let x = 0.5 * dot(diff, diff);
+    // log(1 - x); the series is good to 1e-7 below 0.05.
+    let series = -x * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2))));
+    let log_cos = select(log(max(1.0 - x, TINY)), series, x < 0.05);
+    return select(0.0, exp(exponent * log_cos), x < 1.0);
+}
+
+struct LobeSample {
+    d: vec3f,
+    // cos^n(alpha) of d, from the random number itself.
+    power: f32,
+}
+
+// Unit direction about r with density (n + 1) / (2 pi) cos^n(alpha) per solid angle.
+fn sample_lobe(r: vec3f, exponent: f32, u: vec2f) -> LobeSample {
+    // 1 - u is never 0.
+    let log_u = log(1.0 - u.x) / (exponent + 1.0);
+    // 1 - cos^2(alpha) = 1 - exp(2 log_u); the series is good to 1e-7 below 0.05.
+    let x = 2.0 * log_u;
+    let series = -x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0))));
+    let sin2 = select(1.0 - exp(x), series, x > -0.05);
+    let circle = unit_circle(u.y) * safe_sqrt(sin2);
+    let d = normalize(from_frame(r, vec3f(circle, safe_sqrt(1.0 - sin2))));
+    return LobeSample(d, exp(exponent * log_u));
+}
+
+// Probability of choosing the specular lobe.
+fn lobe_probability(kd: vec3f, ks: vec3f) -> f32 {
+    let d = kd.x + kd.y + kd.z;
+    let s = ks.x + ks.y + ks.z;
+    return s / max(d + s, TINY);
+}
+
+struct PhongValue {
+    // f times the cosine, per steradian.
+    f_cos: vec3f,
+    // Density of the mixture of both lobes, per solid angle.
+    pdf: f32,
+}
+
+// For a direction at cosine `cos` > 0 to the normal whose cos^n(alpha) is `power`.
+fn phong_value(kd: vec3f, ks: vec3f, exponent: f32, cos: f32, power: f32) -> PhongValue {
+    let choice = lobe_probability(kd, ks);
+    let lobe = power * 0.15915494;
+    let f = kd * 0.31830989 + ks * ((exponent + 2.0) * lobe);
+    let pdf = (1.0 - choice) * cos * 0.31830989 + choice * (exponent + 1.0) * lobe;
+    return PhongValue(f * cos, pdf);
+}

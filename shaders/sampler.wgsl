@@ -1,0 +1,81 @@
+// Random numbers, keyed by (pixel, sample, dimension, seed) [Jarzynski2020]: the value of a sample depends
+// on nothing else, so the work can be cut anywhere.
+
+fn pcg4d(key: vec4u) -> vec4u {
+    var v = key * 1664525u + 1013904223u;
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    v ^= v >> vec4u(16u);
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    return v;
+}
+
+// Uniform in [0, 1): 24 bits, for f32(0xffffffffu) would round to 1.
+fn unit_float(v: vec4u) -> vec4f {
+    return vec4f(v >> vec4u(8u)) * 0x1.0p-24;
+}
+
+// What one path vertex draws.
+struct Draws {
+    // Point on a light (2), direction of scattering (2).
+    points: vec4f,
+    // Which light, which lobe (or reflection against refraction), roulette; the last is spare.
+    choices: vec4f,
+}
+
+fn draw(key: vec4u) -> Draws {
+    let a = pcg4d(key);
+    // One more round makes four more words for a third of the price.
+    var b = a ^ (a >> vec4u(16u));
+    b.x += b.y * b.w;
+    b.y += b.z * b.x;
+    b.z += b.x * b.y;
+    b.w += b.y * b.z;
+    return Draws(unit_float(a), unit_float(b));
+}
+
+// Position i of a random permutation of `count` elements, keyed by p [Kensler2013].
+fn permute(i: u32, count: u32, p: u32) -> u32 {
+    var mask = count - 1u;
+    mask |= mask >> 1u;
+    mask |= mask >> 2u;
+    mask |= mask >> 4u;
+    mask |= mask >> 8u;
+    mask |= mask >> 16u;
+    var k = permute_step(i, mask, p);
+#if STRATA_NOT_A_POWER_OF_TWO
+    // Fewer than half of all values lie outside; each is sent on until it lies inside.
+    while k >= count {
+        k = permute_step(k, mask, p);
+    }
+#endif
+    return (k + p) % count;
+}
+
+fn permute_step(i: u32, mask: u32, p: u32) -> u32 {
+    var k = i;
+    k ^= p;
+    k *= 0xe170893du;
+    k ^= p >> 16u;
+    k ^= (k & mask) >> 4u;
+    k ^= p >> 8u;
+    k *= 0x0929eb3fu;
+    k ^= p >> 23u;
+    k ^= (k & mask) >> 1u;
+    k *= 1u | (p >> 27u);
+    k *= 0x6935fa69u;
+    k ^= (k & mask) >> 11u;
+    k *= 0x74dcb303u;
+    k ^= (k & mask) >> 2u;
+    k *= 0x9e501cc3u;
+    k ^= (k & mask) >> 2u;
+    k *= 0xc860a3dfu;
+    k &= mask;
+    k ^= k >> 5u;
+    return k;
+}

@@ -1,0 +1,457 @@
+//! Dispatches: samples are cut into submissions by measured cost, which touches no bit of the picture.
+
+use super::adapters::WORKGROUP;
+use super::pack::{Params, pack};
+use super::tile::Tile;
+use super::{Choice, Gpu, GpuError};
+use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
+use crate::film::coverage::Rect;
+use crate::film::{BLOCK, Film, REPLICATES, samples_before};
+use crate::kernel::{Access, Kernel, compose};
+use crate::settings::Settings;
+use crate::world::World;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+use wgpu::util::DeviceExt as _;
+
+/// A submission aims to take this long: short for watchdogs and progress, long beside its overhead.
+const SUBMISSION_SECONDS: f64 = 0.1;
+
+/// Uniform offsets are multiples of this on every adapter.
+const SLOT: u64 = 256;
+
+/// The engine that runs a scene's kernel on a Vulkan adapter.
+pub struct GpuEngine {
+    gpu: Gpu,
+    kernel: Kernel,
+    pipeline: wgpu::ComputePipeline,
+    scene: wgpu::BindGroup,
+    film_layout: wgpu::BindGroupLayout,
+    params: wgpu::Buffer,
+    tile: Option<Tile>,
+    strata: u32,
+    seed: u32,
+    /// Seconds that one sample of one pixel takes, as measured so far.
+    seconds_per_path: Option<f64>,
+    compile_seconds: f64,
+}
+
+impl GpuEngine {
+    /// Opens the chosen adapter and compiles the scene's kernel; `access` overrides the rule that picks
+    /// baked or buffered values.
+    pub fn new(
+        choice: &Choice,
+        world: &World,
+        settings: &Settings,
+        access: Option<Access>,
+    ) -> Result<Self, GpuError> {
+        Self::on(Gpu::open(choice)?, world, settings, access)
+    }
+
+    /// The same on an open device.
+    pub fn on(
+        gpu: Gpu,
+        world: &World,
+        settings: &Settings,
+        access: Option<Access>,
+    ) -> Result<Self, GpuError> {
+        let start = Instant::now();
+        let unable = |problem: String| GpuError::Unable {
+            adapter: gpu.info.name.clone(),
+            problem,
+        };
+        let mut kernel = compose(world, settings, access);
+        if let Ok(p) = std::env::var("DEV_WGSL") {
+            kernel.wgsl = std::fs::read_to_string(p).unwrap();
+        }
+        if kernel.trips_per_sample > gpu.trip_limit {
+            return Err(unable(format!(
+                "one path of this scene may take {} loop trips (max_depth {}), and this driver silently stops an \
+                 invocation at 65535; lower max_depth or use --backend cpu",
+                kernel.trips_per_sample, settings.max_depth
+            )));
+        }
+        let packed = pack(world);
+        let device = &gpu.device;
+        let limit = device.limits().max_storage_buffer_binding_size;
+        let bytes = size_of_val(&packed.surfaces[..]) as u64;
+        if bytes > limit {
+            return Err(unable(format!(
+                "{} surfaces need a storage buffer of {bytes} bytes, it binds {limit} at most",
+                packed.surfaces.len()
+            )));
+        }
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let oom = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        // SAFETY: without runtime checks the kernel must not index out of bounds or loop for ever. All its
+        // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
+        // length, or pixels that it compares with the tile's size first; its loops run over constant
+        // ranges, or over samples, each at most max_depth trips long.
+        let module = unsafe {
+            device.create_shader_module_trusted(
+                wgpu::ShaderModuleDescriptor {
+                    label: Some("path"),
+                    source: wgpu::ShaderSource::Wgsl(kernel.wgsl.as_str().into()),
+                },
+                wgpu::ShaderRuntimeChecks::unchecked(),
+            )
+        };
+        let storage = |binding| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Storage { read_only: true },
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            count: None,
+        };
+        let scene_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("scene"),
+            entries: &[storage(0), storage(1), storage(2)],
+        });
+        let film_layout = film_layout(device);
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: None,
+            bind_group_layouts: &[Some(&scene_layout), Some(&film_layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("path"),
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some("render"),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        let buffer = |contents: &[u8]| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("scene"),
+                contents,
+                usage: wgpu::BufferUsages::STORAGE,
+            })
+        };
+        let buffers = [
+            buffer(bytemuck::cast_slice(&packed.surfaces)),
+            buffer(bytemuck::cast_slice(&packed.materials)),
+            buffer(bytemuck::cast_slice(&packed.lights)),
+        ];
+        let scene = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene"),
+            layout: &scene_layout,
+            entries: &[0, 1, 2].map(|k| wgpu::BindGroupEntry {
+                binding: k as u32,
+                resource: buffers[k].as_entire_binding(),
+            }),
+        });
+        let params = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("params"),
+            size: SLOT * REPLICATES as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        for error in [
+            pollster::block_on(oom.pop()),
+            pollster::block_on(scope.pop()),
+        ]
+        .into_iter()
+        .flatten()
+        {
+            return Err(unable(format!("the kernel was refused: {error}")));
+        }
+        let mut engine = Self {
+            kernel,
+            pipeline,
+            scene,
+            film_layout,
+            params,
+            tile: None,
+            strata: settings.strata,
+            seed: settings.seed,
+            seconds_per_path: None,
+            compile_seconds: 0.0,
+            gpu,
+        };
+        engine.warm_up().map_err(|problem| GpuError::Unable {
+            adapter: engine.gpu.info.name.clone(),
+            problem,
+        })?;
+        engine.compile_seconds = start.elapsed().as_secs_f64();
+        Ok(engine)
+    }
+
+    /// Seconds from the opened device to the compiled kernel.
+    pub fn compile_seconds(&self) -> f64 {
+        self.compile_seconds
+    }
+
+    /// The kernel.
+    pub fn kernel(&self) -> &Kernel {
+        &self.kernel
+    }
+
+    /// Drivers may compile at the first dispatch: make it one without samples.
+    fn warm_up(&mut self) -> Result<(), String> {
+        let rect = Rect {
+            x0: 0,
+            y0: 0,
+            x1: 1,
+            y1: 1,
+        };
+        self.prepare_tile(rect)?;
+        let mut place = [Some(0); REPLICATES];
+        let tile = self.tile.as_ref().ok_or("no tile")?;
+        tile.upload(&self.gpu, &[Default::default()]);
+        self.submit(rect, 0..0, &mut place, true)?;
+        self.tile = None;
+        Ok(())
+    }
+
+    fn prepare_tile(&mut self, rect: Rect) -> Result<(), String> {
+        let size = [rect.width(), rect.height()];
+        if self.tile.as_ref().is_none_or(|t| t.size != size) {
+            self.tile = None;
+            let oom = self
+                .gpu
+                .device
+                .push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+            let invalid = self
+                .gpu
+                .device
+                .push_error_scope(wgpu::ErrorFilter::Validation);
+            let tile = Tile::new(&self.gpu, &self.film_layout, &self.params, size);
+            let errors = [
+                pollster::block_on(invalid.pop()),
+                pollster::block_on(oom.pop()),
+            ];
+            if let Some(e) = errors.into_iter().flatten().next() {
+                return Err(format!(
+                    "no memory for a tile of {} x {} pixels: {e}",
+                    size[0], size[1]
+                ));
+            }
+            self.tile = Some(tile);
+        }
+        Ok(())
+    }
+
+    /// Dispatches `samples` of every pixel of `rect`, a dispatch for each replicate that owns some, and
+    /// waits. `place` says which texture holds a replicate's running sums (`None`: they start at zero);
+    /// `empty` dispatches without samples.
+    fn submit(
+        &mut self,
+        rect: Rect,
+        samples: Range<u64>,
+        place: &mut [Option<usize>; REPLICATES],
+        empty: bool,
+    ) -> Result<(), String> {
+        let tile = self.tile.as_ref().ok_or("no tile")?;
+        let round = u64::from(self.strata) * u64::from(self.strata);
+        let groups = (rect.area() as u32).div_ceil(WORKGROUP);
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &self.scene, &[]);
+            for (r, at) in place.iter_mut().enumerate() {
+                let first = samples_before(samples.start, r as u64, round);
+                let end = samples_before(samples.end, r as u64, round);
+                if first == end && !empty {
+                    continue;
+                }
+                let params = Params {
+                    tile: [rect.x0, rect.y0],
+                    size: [rect.width(), rect.height()],
+                    first: first as u32,
+                    end: end as u32,
+                    replicate: r as u32,
+                    fresh: u32::from(at.is_none()),
+                    seed: self.seed,
+                    groups,
+                    stride: coprime_stride(groups),
+                    padding: 0,
+                };
+                self.gpu.queue.write_buffer(
+                    &self.params,
+                    SLOT * r as u64,
+                    bytemuck::bytes_of(&params),
+                );
+                let from = at.unwrap_or(0);
+                pass.set_bind_group(1, &tile.bind_groups[from], &[(SLOT * r as u64) as u32]);
+                pass.dispatch_workgroups(groups, 1, 1);
+                *at = Some(1 - from);
+            }
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.wait()
+    }
+
+    fn render_tile(
+        &mut self,
+        film: &Film,
+        rect: Rect,
+        samples: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<super::tile::TileData, EngineError> {
+        let device_error = EngineError::Device;
+        self.prepare_tile(rect).map_err(device_error)?;
+        let tile = self
+            .tile
+            .as_ref()
+            .ok_or_else(|| EngineError::Device("no tile".into()))?;
+        let mut place = [None; REPLICATES];
+        if samples.start % BLOCK != 0 {
+            let pixels = (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
+            let running: Vec<_> = pixels.map(|(x, y)| film.partial_at(x, y)).collect();
+            tile.upload(&self.gpu, &running);
+            place = [Some(0); REPLICATES];
+        }
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        tile.clear_counters(&mut encoder);
+        self.gpu.queue.submit([encoder.finish()]);
+
+        let most = (self.gpu.trip_limit / self.kernel.trips_per_sample).max(1);
+        let pixels = rect.area() as f64;
+        let mut at = samples.start;
+        while at < samples.end {
+            if stop.load(Ordering::Relaxed) {
+                return Err(EngineError::Stopped);
+            }
+            let affordable = match self.seconds_per_path {
+                Some(cost) => (SUBMISSION_SECONDS / (cost * pixels)) as u64,
+                None => 1,
+            };
+            let count = affordable.clamp(1, most.min(samples.end - at));
+            let start = Instant::now();
+            self.submit(rect, at..at + count, &mut place, false)
+                .map_err(device_error)?;
+            let cost = start.elapsed().as_secs_f64() / (count as f64 * pixels);
+            self.seconds_per_path =
+                Some(self.seconds_per_path.map_or(cost, |old| 0.5 * (old + cost)));
+            at += count;
+        }
+        let tile = self
+            .tile
+            .as_ref()
+            .ok_or_else(|| EngineError::Device("no tile".into()))?;
+        tile.download(&self.gpu, &place).map_err(device_error)
+    }
+}
+
+impl Engine for GpuEngine {
+    fn render(
+        &mut self,
+        film: &mut Film,
+        rect: Rect,
+        samples: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError> {
+        let data = self.render_tile(film, rect, samples.clone(), stop)?;
+        let mut counters = Counters {
+            paths: rect.area() * (samples.end - samples.start),
+            ..Counters::default()
+        };
+        let width = rect.width() as usize;
+        for (i, c) in data.counters.iter().enumerate() {
+            counters.rays += u64::from(c[0]);
+            counters.truncated += u64::from(c[1]);
+            counters.nonfinite += u64::from(c[2]);
+            if c[2] > 0 && counters.first_nonfinite.is_none() {
+                let (x, y) = (rect.x0 + (i % width) as u32, rect.y0 + (i / width) as u32);
+                counters.first_nonfinite = Some((x, y, u64::from(c[3]) - 1));
+            }
+        }
+        film.put_block(rect, samples, |x, y| {
+            data.running[(y - rect.y0) as usize * width + (x - rect.x0) as usize]
+        });
+        Ok(counters)
+    }
+
+    fn device(&self) -> &DeviceInfo {
+        &self.gpu.info
+    }
+}
+
+/// About 0.618 of `groups`, and without a common divisor with it: steps of this visit every group once.
+fn coprime_stride(groups: u32) -> u32 {
+    let gcd = |mut a: u32, mut b: u32| {
+        while b > 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    };
+    let start = (f64::from(groups) * 0.618_034) as u32;
+    (start..)
+        .find(|&s| s > 0 && gcd(s, groups) == 1)
+        .unwrap_or(1)
+}
+
+fn film_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty,
+        count: None,
+    };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("film"),
+        entries: &[
+            entry(
+                0,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Uniform,
+                    has_dynamic_offset: true,
+                    min_binding_size: None,
+                },
+            ),
+            entry(
+                1,
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    view_dimension: wgpu::TextureViewDimension::D2Array,
+                    multisampled: false,
+                },
+            ),
+            entry(
+                2,
+                wgpu::BindingType::StorageTexture {
+                    access: wgpu::StorageTextureAccess::WriteOnly,
+                    format: wgpu::TextureFormat::Rgba32Float,
+                    view_dimension: wgpu::TextureViewDimension::D2Array,
+                },
+            ),
+            entry(
+                3,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Storage { read_only: false },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+            ),
+        ],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strides_visit_every_group() {
+        for groups in [1, 2, 3, 7, 64, 3072, 16384] {
+            let stride = coprime_stride(groups);
+            let mut seen = vec![false; groups as usize];
+            for g in 0..groups {
+                seen[(u64::from(g) * u64::from(stride) % u64::from(groups)) as usize] = true;
+            }
+            assert!(seen.iter().all(|s| *s), "{groups} groups, stride {stride}");
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! The GPU: adapters, buffers, and the engine that dispatches kernels.
+
+mod adapters;
+mod engine;
+pub mod pack;
+pub mod probe;
+mod tile;
+
+pub use adapters::{AdapterReport, Choice, Gpu, adapters};
+pub use engine::GpuEngine;
+
+/// Why there is no GPU engine.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum GpuError {
+    /// No adapter at all, or none with the name asked for.
+    #[error("{0}")]
+    NoAdapter(String),
+    /// The adapter cannot do what this picture needs.
+    #[error("{adapter}: {problem}")]
+    Unable {
+        /// Its name.
+        adapter: String,
+        /// What it cannot do, with the numbers.
+        problem: String,
+    },
+}

@@ -1,0 +1,228 @@
+//! The textures and buffers of one tile, and their way to and from the host.
+
+use super::Gpu;
+use crate::film::{REPLICATES, Sums};
+
+/// Bytes of an rgba32float texel.
+const TEXEL: u32 = 16;
+
+/// GPU memory for a tile of `size` pixels.
+pub(super) struct Tile {
+    pub size: [u32; 2],
+    /// Running sums, one layer for each replicate; a dispatch reads one and writes the other.
+    textures: [wgpu::Texture; 2],
+    /// Bind group k reads texture k.
+    pub bind_groups: [wgpu::BindGroup; 2],
+    counters: wgpu::Buffer,
+    staging: wgpu::Buffer,
+}
+
+fn row_bytes(width: u32) -> u32 {
+    (width * TEXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
+}
+
+impl Tile {
+    pub fn new(
+        gpu: &Gpu,
+        layout: &wgpu::BindGroupLayout,
+        params: &wgpu::Buffer,
+        size: [u32; 2],
+    ) -> Self {
+        let texture = || {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("running sums"),
+                size: extent(size, REPLICATES as u32),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba32Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING
+                    | wgpu::TextureUsages::STORAGE_BINDING
+                    | wgpu::TextureUsages::COPY_SRC
+                    | wgpu::TextureUsages::COPY_DST,
+                view_formats: &[],
+            })
+        };
+        let textures = [texture(), texture()];
+        let counter_bytes = u64::from(size[0]) * u64::from(size[1]) * u64::from(TEXEL);
+        let counters = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("counters"),
+            size: counter_bytes,
+            usage: wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("staging"),
+            size: counter_bytes.next_multiple_of(256) + layer_bytes(size) * REPLICATES as u64,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let view = |k: usize| {
+            textures[k].create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..Default::default()
+            })
+        };
+        let bind_group = |from: usize| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("film"),
+                layout,
+                entries: &[
+                    wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                            buffer: params,
+                            offset: 0,
+                            size: wgpu::BufferSize::new(size_of::<super::pack::Params>() as u64),
+                        }),
+                    },
+                    wgpu::BindGroupEntry {
+                        binding: 1,
+                        resource: wgpu::BindingResource::TextureView(&view(from)),
+                    },
+                    wgpu::BindGroupEntry {
+                        binding: 2,
+                        resource: wgpu::BindingResource::TextureView(&view(1 - from)),
+                    },
+                    wgpu::BindGroupEntry {
+                        binding: 3,
+                        resource: counters.as_entire_binding(),
+                    },
+                ],
+            })
+        };
+        let bind_groups = [bind_group(0), bind_group(1)];
+        Self {
+            size,
+            textures,
+            bind_groups,
+            counters,
+            staging,
+        }
+    }
+
+    /// Counters to zero.
+    pub fn clear_counters(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.clear_buffer(&self.counters, 0, None);
+    }
+
+    /// Puts running sums, rows of the tile, into texture 0.
+    pub fn upload(&self, gpu: &Gpu, sums: &[[Sums<f32>; REPLICATES]]) {
+        for r in 0..REPLICATES {
+            let layer: Vec<Sums<f32>> = sums.iter().map(|s| s[r]).collect();
+            gpu.queue.write_texture(
+                wgpu::TexelCopyTextureInfo {
+                    texture: &self.textures[0],
+                    mip_level: 0,
+                    origin: wgpu::Origin3d {
+                        x: 0,
+                        y: 0,
+                        z: r as u32,
+                    },
+                    aspect: wgpu::TextureAspect::All,
+                },
+                bytemuck::cast_slice(&layer),
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(self.size[0] * TEXEL),
+                    rows_per_image: None,
+                },
+                extent(self.size, 1),
+            );
+        }
+    }
+
+    /// Reads the counters, and each replicate from the texture that `place` says; `None` reads as zeros.
+    pub fn download(
+        &self,
+        gpu: &Gpu,
+        place: &[Option<usize>; REPLICATES],
+    ) -> Result<TileData, String> {
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let counter_bytes = self.counters.size();
+        encoder.copy_buffer_to_buffer(&self.counters, 0, &self.staging, 0, counter_bytes);
+        for (r, k) in place.iter().enumerate() {
+            let Some(k) = k else { continue };
+            encoder.copy_texture_to_buffer(
+                wgpu::TexelCopyTextureInfo {
+                    texture: &self.textures[*k],
+                    mip_level: 0,
+                    origin: wgpu::Origin3d {
+                        x: 0,
+                        y: 0,
+                        z: r as u32,
+                    },
+                    aspect: wgpu::TextureAspect::All,
+                },
+                wgpu::TexelCopyBufferInfo {
+                    buffer: &self.staging,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: counter_bytes.next_multiple_of(256)
+                            + layer_bytes(self.size) * r as u64,
+                        bytes_per_row: Some(row_bytes(self.size[0])),
+                        rows_per_image: None,
+                    },
+                },
+                extent(self.size, 1),
+            );
+        }
+        gpu.queue.submit([encoder.finish()]);
+        self.staging
+            .slice(..)
+            .map_async(wgpu::MapMode::Read, |_| {});
+        gpu.wait()?;
+        let mapped = self
+            .staging
+            .slice(..)
+            .get_mapped_range()
+            .map_err(|e| format!("reading back failed: {e}"))?;
+        let bytes: &[u8] = &mapped;
+        let pixels = self.size[0] as usize * self.size[1] as usize;
+        let mut data = TileData {
+            running: vec![Default::default(); pixels],
+            counters: bytemuck::pod_collect_to_vec(&bytes[..counter_bytes as usize]),
+        };
+        let width = self.size[0] as usize;
+        let stride = row_bytes(self.size[0]) as usize;
+        for (r, k) in place.iter().enumerate() {
+            if k.is_none() {
+                continue;
+            }
+            let layer = &bytes[counter_bytes.next_multiple_of(256) as usize
+                + layer_bytes(self.size) as usize * r..];
+            for (y, row) in data.running.chunks_exact_mut(width).enumerate() {
+                let texels =
+                    layer[y * stride..][..width * TEXEL as usize].chunks_exact(TEXEL as usize);
+                for (pixel, texel) in row.iter_mut().zip(texels) {
+                    pixel[r] = bytemuck::pod_read_unaligned(texel);
+                }
+            }
+        }
+        drop(mapped);
+        self.staging.unmap();
+        Ok(data)
+    }
+}
+
+/// What a tile holds, rows of pixels.
+pub(super) struct TileData {
+    pub running: Vec<[Sums<f32>; REPLICATES]>,
+    /// Rays, truncated paths, non-finite samples, 1 + number of the first of those.
+    pub counters: Vec<[u32; 4]>,
+}
+
+fn layer_bytes(size: [u32; 2]) -> u64 {
+    u64::from(row_bytes(size[0])) * u64::from(size[1])
+}
+
+fn extent(size: [u32; 2], layers: u32) -> wgpu::Extent3d {
+    wgpu::Extent3d {
+        width: size[0],
+        height: size[1],
+        depth_or_array_layers: layers,
+    }
+}

@@ -1,0 +1,288 @@
+//! The kernel made for one scene: the modules of `shaders/` that it needs, constants, and the generated
+//! functions that meet its primitives and choose its lights.
+
+mod literal;
+mod preprocess;
+mod rays;
+mod select;
+mod tables;
+
+pub use select::{Access, BAKED_LIMIT};
+
+use crate::film::REPLICATES;
+use crate::scene::Bsdf;
+use crate::settings::{Integrator, LightParts, Settings};
+use crate::world::{AIR, Geometry, World};
+use literal::{float, vector};
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+/// Vertices that a path keeps for certain before roulette may end it.
+const ROULETTE_DEPTH: u32 = 5;
+
+/// Tags of [`Bsdf`] in `Material.kind`; the names are the kernel's constants.
+pub(crate) const MATERIAL_TAGS: [&str; 4] = [
+    "MATERIAL_DIFFUSE",
+    "MATERIAL_MIRROR",
+    "MATERIAL_DIELECTRIC",
+    "MATERIAL_PHONG",
+];
+
+/// Tags of [`Geometry`] in `Surface.shape`; flat shapes first.
+pub(crate) const SHAPE_TAGS: [&str; 5] = [
+    "SHAPE_PLANE",
+    "SHAPE_DISK",
+    "SHAPE_CYLINDER",
+    "SHAPE_SPHERE",
+    "SHAPE_HUGE_SPHERE",
+];
+
+/// Index into [`MATERIAL_TAGS`].
+pub(crate) fn material_tag(bsdf: &Bsdf) -> u32 {
+    match bsdf {
+        Bsdf::Diffuse { .. } => 0,
+        Bsdf::Mirror { .. } => 1,
+        Bsdf::Dielectric { .. } => 2,
+        Bsdf::Phong { .. } => 3,
+    }
+}
+
+/// Index into [`SHAPE_TAGS`].
+pub(crate) fn shape_tag(geometry: &Geometry) -> u32 {
+    match geometry {
+        Geometry::Plane { .. } => 0,
+        Geometry::Disk { .. } => 1,
+        Geometry::Cylinder { .. } => 2,
+        Geometry::Sphere { .. } => 3,
+        Geometry::HugeSphere { .. } => 4,
+    }
+}
+
+/// The modules of `shaders/`, in the order in which they are read.
+pub const MODULES: [(&str, &str); 15] = [
+    ("ray", include_str!("../../shaders/ray.wgsl")),
+    ("frame", include_str!("../../shaders/frame.wgsl")),
+    ("sampler", include_str!("../../shaders/sampler.wgsl")),
+    ("camera", include_str!("../../shaders/camera.wgsl")),
+    ("disk", include_str!("../../shaders/disk.wgsl")),
+    ("cylinder", include_str!("../../shaders/cylinder.wgsl")),
+    ("plane", include_str!("../../shaders/plane.wgsl")),
+    ("sphere", include_str!("../../shaders/sphere.wgsl")),
+    (
+        "huge_sphere",
+        include_str!("../../shaders/huge_sphere.wgsl"),
+    ),
+    ("light", include_str!("../../shaders/light.wgsl")),
+    ("diffuse", include_str!("../../shaders/diffuse.wgsl")),
+    ("mirror", include_str!("../../shaders/mirror.wgsl")),
+    ("dielectric", include_str!("../../shaders/dielectric.wgsl")),
+    ("phong", include_str!("../../shaders/phong.wgsl")),
+    ("surface", include_str!("../../shaders/surface.wgsl")),
+];
+
+/// The entry point and the path loop.
+const PATH: &str = include_str!("../../shaders/path.wgsl");
+
+/// A composed kernel.
+#[derive(Debug, Clone)]
+pub struct Kernel {
+    /// Its WGSL: entry point `render`, 64 invocations a workgroup.
+    pub wgsl: String,
+    /// How it reaches the scene's values.
+    pub access: Access,
+    /// The most loop trips that one sample can take of an invocation.
+    pub trips_per_sample: u64,
+}
+
+/// Composes the kernel of `world` under `settings`; `access` overrides the rule of [`Access::choose`].
+pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Kernel {
+    let access = access.unwrap_or_else(|| Access::choose(world));
+    let features = features(world, settings);
+    let mut wgsl = String::from("// Made for one scene by etendue.\n\n");
+    tags(&mut wgsl);
+    wgsl.push_str(&constants(world, settings));
+    for (name, text) in MODULES {
+        if needs(name, &features) {
+            let _ = write!(
+                wgsl,
+                "\n// ---- {name}.wgsl\n\n{}",
+                preprocess::run(text, &features)
+            );
+        }
+    }
+    wgsl.push_str("\n// ---- this scene\n\n");
+    wgsl.push_str(&rays::generate(world, access, &features));
+    let _ = write!(
+        wgsl,
+        "\n// ---- path.wgsl\n\n{}",
+        preprocess::run(PATH, &features)
+    );
+    let inner = match access {
+        Access::Baked => 0,
+        Access::Buffers => {
+            // Every vertex: nearest hit and shadow rays over all surfaces, light choice over all lights.
+            let rays = 1 + u64::from(settings.shadow_rays);
+            rays * (world.lights.len() + world.primitives.len()) as u64
+                + u64::from(settings.shadow_rays) * world.lights.len() as u64
+        }
+    };
+    let shadow_loop = if settings.shadow_rays > 1 {
+        u64::from(settings.shadow_rays)
+    } else {
+        0
+    };
+    let strata_loop = 32;
+    let trips_per_sample = u64::from(last_depth(settings))
+        .saturating_mul(1 + inner + shadow_loop)
+        .saturating_add(strata_loop);
+    Kernel {
+        wgsl,
+        access,
+        trips_per_sample,
+    }
+}
+
+/// A shader whose entry point `probe` runs `body` on 16 floats `x` into 16 floats `y`, beside all modules but the camera.
+pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
+    let features: BTreeSet<&str> = features.iter().copied().collect();
+    let mut s = String::new();
+    tags(&mut s);
+    for (name, text) in MODULES {
+        if name != "camera" {
+            s.push_str(&preprocess::run(text, &features));
+        }
+    }
+    s.push_str(
+        "@group(0) @binding(0) var<storage, read> inputs: array<array<f32, 16>>;\n\
+         @group(0) @binding(1) var<storage, read_write> outputs: array<array<f32, 16>>;\n\
+         @compute @workgroup_size(64)\n\
+         fn probe(@builtin(global_invocation_id) id: vec3u) {\n\
+             if id.x >= arrayLength(&inputs) { return; }\n\
+             let x = inputs[id.x];\n\
+             var y = outputs[id.x];\n",
+    );
+    s.push_str(body);
+    s.push_str("\n    outputs[id.x] = y;\n}\n");
+    s
+}
+
+fn tags(s: &mut String) {
+    for names in [&MATERIAL_TAGS[..], &SHAPE_TAGS[..]] {
+        for (tag, name) in names.iter().enumerate() {
+            let _ = writeln!(s, "const {name}: u32 = {tag}u;");
+        }
+    }
+}
+
+/// Number of the last vertex that can matter, for the light that is kept.
+fn last_depth(settings: &Settings) -> u32 {
+    settings.max_depth.min(needed_depth(settings))
+}
+
+/// Vertices beyond which none of the light that is kept can be found.
+fn needed_depth(settings: &Settings) -> u32 {
+    match settings.light {
+        LightParts { indirect: true, .. } => u32::MAX,
+        LightParts { direct: true, .. } => 2,
+        _ => 1,
+    }
+}
+
+/// Names that are true for this scene, for `#if` in the modules and for [`needs`].
+fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
+    let mut f = BTreeSet::new();
+    let mut set = |name, on: bool| {
+        if on {
+            f.insert(name);
+        }
+    };
+    let used: Vec<&Bsdf> = world
+        .primitives
+        .iter()
+        .map(|p| &world.materials[p.material])
+        .collect();
+    let any = |tag: u32| used.iter().any(|b| material_tag(b) == tag);
+    let (diffuse, mirror, dielectric, phong) = (any(0), any(1), any(2), any(3));
+    set("DIFFUSE", diffuse);
+    set("MIRROR", mirror);
+    set("DIELECTRIC", dielectric);
+    set("PHONG", phong);
+
+    let shape = |tag: u32| {
+        world
+            .primitives
+            .iter()
+            .any(|p| shape_tag(&p.geometry) == tag)
+    };
+    set("PLANE", shape(0));
+    set("CYLINDER", shape(2));
+    set("SPHERE", shape(3));
+    set("HUGE", shape(4));
+    set("FLAT", shape(0) || shape(1) || shape(2));
+    set("ROUND", shape(2) || shape(3) || shape(4));
+
+    let depth = last_depth(settings);
+    let sampling = depth > 1 && !world.lights.is_empty() && (diffuse || phong);
+    set("LIGHT_SAMPLING", sampling);
+    set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
+    set("SEVERAL_SHADOW_RAYS", settings.shadow_rays > 1);
+    // A cosine-distributed bounce finds what cap sampling finds already, so only a lobe competes.
+    set("MIS", sampling && phong);
+    set("WHITTED", settings.integrator == Integrator::Whitted);
+    set("ALL_LIGHT", settings.light == LightParts::ALL);
+    set(
+        "COUNT_TRUNCATED",
+        settings.max_depth < needed_depth(settings),
+    );
+    set("STRATA", settings.strata > 1);
+    set(
+        "STRATA_NOT_A_POWER_OF_TWO",
+        !settings.strata.is_power_of_two(),
+    );
+    f
+}
+
+/// Whether a kernel with these features contains module `name`.
+fn needs(name: &str, features: &BTreeSet<&str>) -> bool {
+    let has = |f: &str| features.contains(f);
+    match name {
+        "cylinder" => has("CYLINDER"),
+        "plane" => has("PLANE"),
+        "sphere" => has("SPHERE"),
+        "huge_sphere" => has("HUGE"),
+        "diffuse" => has("DIFFUSE") || has("PHONG"),
+        "mirror" => has("MIRROR") || has("DIELECTRIC") || has("PHONG"),
+        "dielectric" => has("DIELECTRIC"),
+        "phong" => has("PHONG"),
+        _ => true,
+    }
+}
+
+fn constants(world: &World, settings: &Settings) -> String {
+    let mut s = String::new();
+    let mut constant = |name: &str, kind: &str, value: String| {
+        let _ = writeln!(s, "const {name}: {kind} = {value};");
+    };
+    let c = &world.camera;
+    constant("CAMERA_EYE", "vec3f", vector(c.eye));
+    constant("CAMERA_FORWARD", "vec3f", vector(c.forward));
+    constant("CAMERA_DX", "vec3f", vector(c.dx));
+    constant("CAMERA_DY", "vec3f", vector(c.dy));
+    let [w, h] = settings.size.map(|n| float(f64::from(n) / 2.0));
+    constant("CAMERA_CENTER", "vec2f", format!("vec2f({w}, {h})"));
+    constant("CAMERA_MEDIUM", "u32", format!("{}u", c.medium));
+    debug_assert_eq!(AIR, 0, "the kernel's comments say so");
+    constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
+    constant("REPLICATES", "u32", format!("{REPLICATES}u"));
+    constant("STRATA", "u32", format!("{}u", settings.strata));
+    constant("ROUND_SAMPLES", "u32", format!("{}u", settings.round()));
+    constant("SHADOW_RAYS", "f32", float(f64::from(settings.shadow_rays)));
+    constant("LAST_DEPTH", "u32", format!("{}u", last_depth(settings)));
+    constant("ROULETTE_DEPTH", "u32", format!("{ROULETTE_DEPTH}u"));
+    if settings.light != LightParts::ALL {
+        constant("KEEP_EMITTED", "bool", settings.light.emitted.to_string());
+        constant("KEEP_DIRECT", "bool", settings.light.direct.to_string());
+        constant("KEEP_INDIRECT", "bool", settings.light.indirect.to_string());
+    }
+    s
+}

@@ -1,0 +1,385 @@
+//! Generated WGSL: `intersect`, `occluded`, `choose_light` and `light_at` of one scene.
+
+use super::literal::{float, vector};
+use super::{Access, tables};
+use crate::world::{COINCIDENT, Geometry, Side, World, WorldLight, WorldPrimitive};
+use glam::DVec3;
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>) -> String {
+    let mut s = String::new();
+    s.push_str(
+        "// The nearest surface that the ray meets; coincident ones in the order of the format.\n",
+    );
+    s.push_str("fn intersect(ray: Ray) -> Hit {\n    var hit = Hit(FAR, NONE);\n");
+    let everything: Vec<Surface> = surfaces(world);
+    calls(&mut s, world, &everything, access, true);
+    s.push_str("    return hit;\n}\n");
+    if features.contains("LIGHT_SAMPLING") {
+        s.push_str("\n// Whether anything lies within `distance` of the ray's origin. What cannot come between two points\n");
+        s.push_str("// of the room, as its own walls, is not asked.\nfn occluded(ray: Ray, distance: f32) -> bool {\n");
+        s.push_str("    var hit = Hit(distance, NONE);\n");
+        let mut blockers = everything;
+        let hull = hull_faces(world);
+        blockers.retain(|b| can_block(world, b, &hull));
+        for b in &mut blockers {
+            if b.function == "sphere_outside" {
+                b.function = "sphere_shadow";
+            }
+        }
+        calls(&mut s, world, &blockers, access, false);
+        s.push_str("    return hit.key != NONE;\n}\n\n");
+        s.push_str(&light_choice(world, access));
+    }
+    s.push('\n');
+    s.push_str(&tables::generate(world, access));
+    s
+}
+
+/// One thing to meet: a light or a primitive, by its number in the kernel (lights first).
+#[derive(Clone, Copy, PartialEq)]
+struct Surface {
+    number: usize,
+    light: bool,
+    /// Function name in WGSL; consecutive surfaces with the same one make one loop.
+    function: &'static str,
+}
+
+fn surfaces(world: &World) -> Vec<Surface> {
+    let lights = (0..world.lights.len()).map(|number| Surface {
+        number,
+        light: true,
+        function: "disk_hit",
+    });
+    let rest = world.primitives.iter().enumerate().map(|(i, p)| Surface {
+        number: world.lights.len() + i,
+        light: false,
+        function: function(p),
+    });
+    lights.chain(rest).collect()
+}
+
+fn function(p: &WorldPrimitive) -> &'static str {
+    match (p.geometry, p.side) {
+        (Geometry::Disk { .. }, _) => "disk_hit",
+        (Geometry::Cylinder { .. }, Side::Outside) => "cylinder_outside",
+        (Geometry::Cylinder { .. }, Side::Inside) => "cylinder_inside",
+        (Geometry::Cylinder { .. }, Side::Both) => "cylinder_boundary",
+        (Geometry::Plane { .. }, Side::Both) => "plane_boundary",
+        (Geometry::Plane { .. }, _) => "plane_front",
+        (Geometry::Sphere { .. }, Side::Outside) => "sphere_outside",
+        (Geometry::Sphere { .. }, Side::Inside) => "sphere_inside",
+        (Geometry::Sphere { .. }, Side::Both) => "sphere_boundary",
+        (Geometry::HugeSphere { .. }, Side::Outside) => "huge_sphere_outside",
+        (Geometry::HugeSphere { .. }, Side::Inside) => "huge_sphere_inside",
+        (Geometry::HugeSphere { .. }, Side::Both) => "huge_sphere_boundary",
+    }
+}
+
+/// Calls that make `hit` the nearest of itself and `list`.
+fn calls(s: &mut String, world: &World, list: &[Surface], access: Access, nearest: bool) {
+    match access {
+        Access::Baked => {
+            let mut paired = vec![false; list.len()];
+            for (k, surface) in list.iter().enumerate() {
+                if paired[k] {
+                    continue;
+                }
+                if nearest && let Some((m, other)) = facing_plane(world, list, k) {
+                    paired[m] = true;
+                    let _ = writeln!(s, "    hit = {};", pair_call(world, surface, other));
+                    continue;
+                }
+                let _ = writeln!(s, "    hit = {};", baked_call(world, surface));
+            }
+        }
+        Access::Buffers => {
+            for run in list.chunk_by(|a, b| a.function == b.function && a.number + 1 == b.number) {
+                let (begin, end) = (run[0].number, run[run.len() - 1].number + 1);
+                let _ = writeln!(s, "    for (var i = {begin}u; i < {end}u; i++) {{");
+                let _ = writeln!(
+                    s,
+                    "        let s = surfaces[i];\n        hit = {};\n    }}",
+                    buffer_call(run[0].function)
+                );
+            }
+        }
+    }
+}
+
+fn primitive(world: &World, s: &Surface) -> WorldPrimitive {
+    world.primitives[s.number - world.lights.len()]
+}
+
+/// An opaque plane later in the list that faces plane `k` and coincides with nothing.
+fn facing_plane<'a>(world: &World, list: &'a [Surface], k: usize) -> Option<(usize, &'a Surface)> {
+    let plane = |s: &Surface| match (s.function, s.light) {
+        ("plane_front", false) => match primitive(world, s).geometry {
+            Geometry::Plane { normal, offset } => Some((normal, offset)),
+            _ => None,
+        },
+        _ => None,
+    };
+    let (normal, offset) = plane(&list[k])?;
+    list.iter().enumerate().skip(k + 1).find(|(_, s)| {
+        // The eye is between them: n.p > offset and n.p < high.
+        plane(s).is_some_and(|(n, o)| n == -normal && -o > offset)
+    })
+}
+
+fn pair_call(world: &World, low: &Surface, high: &Surface) -> String {
+    let (a, b) = (primitive(world, low), primitive(world, high));
+    let (Geometry::Plane { normal, offset }, Geometry::Plane { offset: far, .. }) =
+        (a.geometry, b.geometry)
+    else {
+        unreachable!("facing_plane finds planes");
+    };
+    format!(
+        "plane_pair(hit, ray, Plane({}, {}), {}, {}u, {}u)",
+        vector(normal),
+        float(offset),
+        float(-far),
+        4 * low.number,
+        4 * high.number
+    )
+}
+
+fn baked_call(world: &World, s: &Surface) -> String {
+    let key = 4 * s.number;
+    if s.light {
+        let l = &world.lights[s.number];
+        return format!(
+            "disk_hit(hit, ray, {}, {}u, {key}u)",
+            disk(l.center, l.radius, l.normal, l.offset),
+            l.face
+        );
+    }
+    let p = primitive(world, s);
+    let f = p.faces;
+    let shape = match p.geometry {
+        Geometry::Disk {
+            center,
+            normal,
+            offset,
+            radius,
+        } => disk(center, radius, normal, offset),
+        Geometry::Cylinder {
+            base,
+            axis,
+            offsets,
+            radius,
+        } => format!(
+            "Cylinder({}, {}, {}, vec2f({}, {}))",
+            vector(base),
+            float(radius),
+            vector(axis),
+            float(offsets[0]),
+            float(offsets[1])
+        ),
+        Geometry::Plane { normal, offset } => {
+            format!("Plane({}, {})", vector(normal), float(offset))
+        }
+        Geometry::Sphere { center, radius } => {
+            format!("Sphere({}, {})", vector(center), float(radius))
+        }
+        Geometry::HugeSphere {
+            pole,
+            normal,
+            radius,
+        } => {
+            format!(
+                "HugeSphere({}, {}, {})",
+                vector(pole),
+                float(1.0 / radius),
+                vector(normal)
+            )
+        }
+    };
+    let faces = match p.geometry {
+        Geometry::Cylinder { .. } => format!("{}u, {}u, {}u, ", f[0], f[1], f[2]),
+        // No path stands behind its own plane, so its face does not matter.
+        Geometry::Plane { .. } if p.side == Side::Both => String::new(),
+        _ => format!("{}u, ", f[0]),
+    };
+    let solid = if p.side == Side::Both && !matches!(p.geometry, Geometry::Disk { .. }) {
+        format!(", {}u, {}u", p.solid, p.parent)
+    } else {
+        String::new()
+    };
+    format!("{}(hit, ray, {shape}, {faces}{key}u{solid})", s.function)
+}
+
+fn disk(center: DVec3, radius: f64, normal: DVec3, offset: f64) -> String {
+    format!(
+        "Disk({}, {}, {}, {})",
+        vector(center),
+        float(radius),
+        vector(normal),
+        float(offset)
+    )
+}
+
+fn buffer_call(function: &str) -> String {
+    let (shape, faces) = match function {
+        "disk_hit" => ("Disk(s.point, s.radius, s.axis, s.offset)", "s.faces.x, "),
+        "cylinder_outside" | "cylinder_inside" | "cylinder_boundary" => (
+            "Cylinder(s.point, s.radius, s.axis, vec2f(s.offset, s.top))",
+            "s.faces.x, s.faces.y, s.faces.z, ",
+        ),
+        "plane_front" => ("Plane(s.axis, s.offset)", "s.faces.x, "),
+        "plane_boundary" => ("Plane(s.axis, s.offset)", ""),
+        "sphere_outside" | "sphere_shadow" | "sphere_inside" | "sphere_boundary" => {
+            ("Sphere(s.point, s.radius)", "s.faces.x, ")
+        }
+        _ => ("HugeSphere(s.point, s.offset, s.axis)", "s.faces.x, "),
+    };
+    let solid = if function.ends_with("_boundary") {
+        ", s.solid, s.parent"
+    } else {
+        ""
+    };
+    format!("{function}(hit, ray, {shape}, {faces}i * 4u{solid})")
+}
+
+/// Faces of the convex hull that holds every light: opaque planes that no light reaches behind. A segment from a point in
+/// front of such a plane to a light never crosses it.
+fn hull_faces(world: &World) -> BTreeSet<u32> {
+    let in_front = |normal: DVec3, offset: f64| {
+        world.lights.iter().all(|l| {
+            let lowest = normal.dot(l.center) - l.radius * normal.cross(l.normal).length();
+            lowest >= offset - COINCIDENT * l.radius
+        })
+    };
+    world
+        .primitives
+        .iter()
+        .filter_map(|p| match p.geometry {
+            Geometry::Plane { normal, offset }
+                if p.side == Side::Outside && in_front(normal, offset) =>
+            {
+                Some(p.faces[0])
+            }
+            _ => None,
+        })
+        .collect()
+}
+
+/// Whether a surface can lie between a point that a path reaches and a light.
+fn can_block(world: &World, s: &Surface, hull: &BTreeSet<u32>) -> bool {
+    if s.light {
+        // Flush on the hull it is as much out of the way as the hull.
+        return !hull.contains(&world.lights[s.number].face);
+    }
+    let p = primitive(world, s);
+    match p.geometry {
+        Geometry::Plane { .. } => !(p.side == Side::Outside && hull.contains(&p.faces[0])),
+        Geometry::Disk { .. } => !hull.contains(&p.faces[0]),
+        // The solid around the eye is convex: it hides no light that lies inside it.
+        Geometry::Sphere { center, radius } if p.side == Side::Inside => {
+            !world.lights.iter().all(|l| {
+                let v = l.center - center;
+                let along = v.dot(l.normal);
+                let across = (v - l.normal * along).length() + l.radius;
+                along.hypot(across) <= radius * (1.0 + COINCIDENT)
+            })
+        }
+        Geometry::Cylinder {
+            base,
+            axis,
+            offsets,
+            radius,
+        } if p.side == Side::Inside => !world
+            .lights
+            .iter()
+            .all(|l| light_in_cylinder(l, base, axis, offsets, radius)),
+        _ => true,
+    }
+}
+
+fn light_in_cylinder(
+    l: &WorldLight,
+    base: DVec3,
+    axis: DVec3,
+    offsets: [f64; 2],
+    radius: f64,
+) -> bool {
+    let height = axis.dot(l.center);
+    let reach = l.radius * axis.cross(l.normal).length();
+    let v = l.center - base;
+    let out = (v - axis * axis.dot(v)).length() + l.radius;
+    let slack = COINCIDENT * radius;
+    height - reach >= offsets[0] - slack
+        && height + reach <= offsets[1] + slack
+        && out <= radius + slack
+}
+
+pub(super) fn light_literal(l: &WorldLight) -> String {
+    format!(
+        "DiskLight({}, {}, {}, {}, {}, {}u)",
+        vector(l.center),
+        float(l.radius),
+        vector(l.normal),
+        float(l.offset),
+        vector(l.radiance),
+        l.face
+    )
+}
+
+const CHOSEN: &str = "\
+struct Chosen {
+    light: DiskLight,
+    cap: Cap,
+    // Of this light among all, and the sum of all weights.
+    probability: f32,
+    weights: f32,
+}
+
+";
+
+/// Chooses one light with probability in proportion to its weight.
+fn light_choice(world: &World, access: Access) -> String {
+    let mut s = String::from(CHOSEN);
+    s.push_str("fn choose_light(p: vec3f, n: vec3f, u: f32) -> Chosen {\n");
+    if let [only] = world.lights.as_slice() {
+        let _ = writeln!(s, "    let light = {};", light_literal(only));
+        s.push_str("    return Chosen(light, cap_of(light, p), 1.0, 1.0);\n}\n");
+        return s;
+    }
+    // One pass over the lights: each replaces the choice with its share of the sum so far, and the
+    // random number is stretched to be used again.
+    s.push_str("    var index = 0u;\n    var chosen = 0.0;\n    var sum = 0.0;\n    var v = u;\n");
+    let step = "\
+        let w = light_weight(light, cap_of(light, p), n);
+        sum += w;
+        let share = w / max(sum, TINY);
+        let take = v < share;
+        v = select((v - share) / max(1.0 - share, TINY), v / max(share, TINY), take);
+";
+    match access {
+        Access::Baked => {
+            for (i, l) in world.lights.iter().enumerate() {
+                let _ = write!(
+                    s,
+                    "    {{\n        let light = {};\n{step}",
+                    light_literal(l)
+                );
+                let _ = writeln!(
+                    s,
+                    "        index = select(index, {i}u, take);\n        chosen = select(chosen, w, take);\n    }}"
+                );
+            }
+        }
+        Access::Buffers => {
+            let _ = write!(
+                s,
+                "    for (var i = 0u; i < {}u; i++) {{\n        let light = lights[i];\n{step}",
+                world.lights.len()
+            );
+            s.push_str("        index = select(index, i, take);\n        chosen = select(chosen, w, take);\n    }\n");
+        }
+    }
+    s.push_str("    let light = light_at(index);\n");
+    s.push_str("    return Chosen(light, cap_of(light, p), chosen / max(sum, TINY), sum);\n}\n");
+    s
+}

@@ -1,0 +1,35 @@
+//! How a kernel reaches the scene's values.
+
+use crate::world::World;
+
+/// Scenes with more surfaces, lights included, are read from storage buffers: unrolled code costs its
+/// compiler about linear time, and past a few dozen surfaces a loop is as fast.
+pub const BAKED_LIMIT: usize = 48;
+
+/// Where the loops over surfaces and lights find their values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Access {
+    /// One line of code a surface, its values in the text.
+    Baked,
+    /// Loops over storage buffers.
+    Buffers,
+}
+
+impl Access {
+    /// By the number of surfaces alone: the same scene always gets the same kernel.
+    pub fn choose(world: &World) -> Self {
+        if world.lights.len() + world.primitives.len() <= BAKED_LIMIT {
+            Self::Baked
+        } else {
+            Self::Buffers
+        }
+    }
+
+    /// The word for it in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Baked => "baked",
+            Self::Buffers => "buffers",
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! Where the eye is: in a solid, on a surface, on a light.
+
+use super::geometry::{disk_of, signed_distance, size};
+use super::{COINCIDENT, Warnings, called};
+use crate::scene::{Bsdf, Scene, Shape};
+
+/// Just before a light, in its radii: where its light begins.
+const BEFORE: f64 = 1e-3;
+
+/// Warnings about the eye's place.
+pub(super) fn warnings(scene: &Scene) -> Warnings {
+    let eye = scene.camera.eye;
+    let view = eye.distance(scene.camera.look_at);
+    let touches =
+        |shape: &Shape| signed_distance(shape, eye).abs() <= COINCIDENT * size(shape).min(view);
+    let mut warnings = Warnings::default();
+    for l in scene.lights.iter().filter(|l| touches(&disk_of(l))) {
+        warnings.add(l.line, || {
+            format!("the eye is on {}", called("light", l.line))
+        });
+    }
+    for p in &scene.primitives {
+        let name = called(p.shape.kind(), p.line);
+        let is_solid = !matches!(p.shape, Shape::Plane { .. });
+        if touches(&p.shape) {
+            warnings.add(p.line, || {
+                format!("the eye is on the surface of {name}: its side is a matter of rounding")
+            });
+        } else if signed_distance(&p.shape, eye) >= 0.0 {
+            continue;
+        } else if let Bsdf::Dielectric { ior, .. } = scene.materials[p.material].bsdf {
+            warnings.add(p.line, || {
+                format!(
+                    "the eye is inside {name}: what it sees from outside is {:.4} times as bright \
+                 (ior squared)",
+                    ior * ior
+                )
+            });
+        } else if is_solid && !holds_light(scene, &p.shape) {
+            warnings.add(p.line, || {
+                format!(
+                    "the eye is inside {name}, which is opaque and holds no light: it sees nothing"
+                )
+            });
+        }
+    }
+    warnings
+}
+
+/// Whether any light shines in the solid.
+fn holds_light(scene: &Scene, solid: &Shape) -> bool {
+    scene.lights.iter().any(|l| {
+        let before = l.center + l.normal * (BEFORE * l.radius);
+        signed_distance(solid, before) < 0.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{scene, warned};
+
+    // The test scene's eye is at [0,1,4], and looks at [0,1,0]; its light is at [0,4,0].
+    fn found(text: &str) -> bool {
+        !super::warnings(&scene(text)).first.is_empty()
+    }
+
+    fn ball(radius: f64, material: &str) -> String {
+        format!("[[sphere]]\ncenter = [0,1,5]\nradius = {radius}\nmaterial = '{material}'\n")
+    }
+
+    #[test]
+    fn eye_in_a_solid() {
+        assert!(warned(&ball(2.0, "white"), "it sees nothing"));
+        assert!(!found(&ball(0.5, "white")), "outside");
+        assert!(!found(&ball(50.0, "white")), "a room with the light in it");
+        assert!(warned(&ball(2.0, "glass"), "2.3104 times as bright"));
+        assert!(warned(&ball(50.0, "glass"), "2.3104 times as bright"));
+        assert!(!found(&ball(0.5, "glass")));
+        let behind = "[[plane]]\npoint = [0,0,0]\nnormal = [0,-1,0]\nmaterial = 'white'\n";
+        assert!(!found(behind), "opaque planes are two-sided walls");
+        let between = behind
+            .replace("[0,0,0]", "[0,2,0]")
+            .replace("-1,0]", "1,0]");
+        assert!(!found(&between), "so is one before the light");
+        assert!(
+            found(&behind.replace("white", "glass")),
+            "half-spaces of glass are solid"
+        );
+    }
+
+    #[test]
+    fn a_light_flush_on_the_inside_lights_the_room() {
+        let room = "[[cylinder]]\nbase = [0,0,0]\ntop = [0,4,0]\nradius = 9\nmaterial = 'white'\n";
+        assert!(!found(room));
+        assert!(found(&room.replace("[0,4,0]", "[0,3,0]")));
+    }
+
+    #[test]
+    fn eye_on_a_surface() {
+        assert!(warned(
+            &ball(1.0, "white"),
+            "the eye is on the surface of the sphere at line"
+        ));
+        assert!(!found(&ball(0.9999, "white")));
+        let wall = "[[plane]]\npoint = [0,0,4]\nnormal = [0,0,1]\nmaterial = 'white'\n";
+        assert!(found(wall));
+        assert!(!found(&wall.replace("0,4]", "0,4.0001]")));
+    }
+
+    #[test]
+    fn eye_on_a_light() {
+        let lamp =
+            "[[light]]\ncenter = [0.2,1,4]\nnormal = [0,0,-1]\nradius = 0.5\nradiance = [1,1,1]\n";
+        assert!(warned(
+            &format!("{}{lamp}", ball(0.5, "white")),
+            "the eye is on the light at line"
+        ));
+        let beside = lamp.replace("[0.2,", "[0.6,");
+        assert!(!found(&format!("{}{beside}", ball(0.5, "white"))));
+    }
+}

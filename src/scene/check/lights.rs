@@ -1,0 +1,244 @@
+//! Lights that give no light, as far as the picture is concerned.
+
+use super::geometry::{disk_of, hit, points_on_disk, signed_distance};
+use super::{COINCIDENT, Warnings, called, is_dielectric};
+use crate::scene::{Light, Primitive, Scene, Shape};
+use glam::DVec3;
+
+/// Something this near before a light, in its radii, covers it.
+const COVER: f64 = 1e-3;
+/// Points on a light from which to look for a cover.
+const POINTS: usize = 64;
+
+/// Lights that emit nothing.
+pub(super) fn black(scene: &Scene) -> Warnings {
+    let mut warnings = Warnings::default();
+    for l in scene.lights.iter().filter(|l| l.radiance == DVec3::ZERO) {
+        let light = called("light", l.line);
+        warnings.add(l.line, || format!("{light} has radiance 0: a black disk"));
+    }
+    warnings
+}
+
+/// Lights with something opaque right before half of their front or more.
+pub(super) fn covered(scene: &Scene) -> Warnings {
+    let opaque = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
+    let primitives = opaque.map(|p| (p.shape, p.shape.kind(), p.line));
+    let lights = scene.lights.iter().map(|l| (disk_of(l), "light", l.line));
+    let covers: Vec<(Shape, &str, usize)> = primitives.chain(lights).collect();
+
+    let mut warnings = Warnings::default();
+    for l in &scene.lights {
+        // Off the light itself and off what it is flush on: whether that is before or behind is
+        // no matter of distance.
+        let start = 2.0 * COINCIDENT * l.radius;
+        let reach = COVER * l.radius;
+        let is_covered = |shape: &Shape| {
+            if signed_distance(shape, l.center).abs() > l.radius + reach {
+                return false;
+            }
+            let points = points_on_disk(l.center, l.normal, l.radius, POINTS);
+            let before = points.filter(|&p| {
+                let t = hit(shape, p + l.normal * start, l.normal);
+                t.is_some_and(|t| t + start <= reach)
+            });
+            2 * before.count() >= POINTS
+        };
+        if let Some((_, kind, line)) = covers.iter().find(|c| is_covered(&c.0)) {
+            let light = called("light", l.line);
+            let cover = called(kind, *line);
+            warnings.add(l.line, || {
+                format!(
+                    "{light} is covered: {cover} is before its front, within {COVER} of its radius"
+                )
+            });
+        }
+    }
+    warnings
+}
+
+/// Lights whose front lies beyond an opaque plane, or within an opaque solid, that the eye does not.
+pub(super) fn unseen(scene: &Scene) -> Warnings {
+    let eye = scene.camera.eye;
+    let walls: Vec<&Primitive> = scene
+        .primitives
+        .iter()
+        .filter(|p| !is_dielectric(scene, p))
+        .collect();
+    let mut warnings = Warnings::default();
+    for l in &scene.lights {
+        let hidden = walls
+            .iter()
+            .find_map(|p| Some((p, hidden_by(&p.shape, l, eye)?)));
+        if let Some((p, how)) = hidden {
+            let light = called("light", l.line);
+            let wall = called(p.shape.kind(), p.line);
+            warnings.add(l.line, || {
+                format!("{light} {how} {wall}, which is opaque: no light of it is seen")
+            });
+        }
+    }
+    warnings
+}
+
+/// How an opaque shape keeps all light of `l` from the eye for certain, to precede its name.
+fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
+    let slack = COINCIDENT * l.radius;
+    match *shape {
+        Shape::Plane { point, normal } => {
+            let side = normal.dot(eye - point).signum();
+            let normal = normal * side;
+            let height = normal.dot(l.center - point);
+            let tilt = normal.cross(l.normal).length();
+            if height + l.radius * tilt < -slack {
+                Some("is on the other side, seen from the eye, of")
+            } else if height.abs() <= slack && tilt <= COINCIDENT && normal.dot(l.normal) < 0.0 {
+                Some("lies flush on, and faces into,")
+            } else {
+                None
+            }
+        }
+        Shape::Sphere { .. } | Shape::Cylinder { .. } => {
+            if signed_distance(shape, eye) < 0.0 {
+                return None;
+            }
+            // Solids are convex: they hold the disk if they hold its rim.
+            let (x, y) = l.normal.any_orthonormal_pair();
+            let mut rim = (0..POINTS).map(|k| {
+                let turn = k as f64 / POINTS as f64 * std::f64::consts::TAU;
+                l.center + (x * turn.cos() + y * turn.sin()) * l.radius
+            });
+            if rim.all(|p| signed_distance(shape, p) < -slack) {
+                return Some("is inside");
+            }
+            faces_into_cap(shape, l, slack).then_some("lies flush on, and faces into,")
+        }
+        Shape::Disk { .. } => None,
+    }
+}
+
+/// Whether the light lies on a cap with its front to the cylinder's inside.
+fn faces_into_cap(shape: &Shape, l: &Light, slack: f64) -> bool {
+    let Shape::Cylinder { base, top, radius } = *shape else {
+        return false;
+    };
+    let axis = (top - base).normalize();
+    [(base, -axis), (top, axis)].iter().any(|&(cap, outward)| {
+        let between = l.center - cap;
+        let apart = outward.dot(between);
+        let aside = (between - outward * apart).length();
+        apart.abs() <= slack
+            && outward.cross(l.normal).length() <= COINCIDENT
+            && outward.dot(l.normal) < 0.0
+            && aside + l.radius <= radius + slack
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{scene, warned};
+    use super::Warnings;
+    use crate::scene::Scene;
+
+    // The test scene's eye is at [0,1,4], and its light at [0,4,0] shines down.
+    const BALL: &str = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'white'\n";
+
+    fn found(lint: fn(&Scene) -> Warnings, text: &str) -> bool {
+        !lint(&scene(text)).first.is_empty()
+    }
+
+    fn light(center: &str, normal: &str, radiance: &str) -> String {
+        format!(
+            "{BALL}[[light]]\ncenter = {center}\nnormal = {normal}\nradius = 0.5\nradiance = {radiance}\n"
+        )
+    }
+
+    fn plane(point: &str, normal: &str, material: &str) -> String {
+        format!("[[plane]]\npoint = {point}\nnormal = {normal}\nmaterial = '{material}'\n")
+    }
+
+    #[test]
+    fn black_lights() {
+        let dark = light("[0,2,0]", "[0,1,0]", "[0,0.0,0]");
+        assert!(found(super::black, &dark));
+        assert!(!found(super::black, &dark.replace("0.0", "0.1")));
+        assert!(warned(&dark, "has radiance 0"));
+    }
+
+    #[test]
+    fn covered_lights() {
+        let lid = |y: f64, x: f64, radius: f64| {
+            format!(
+                "[[disk]]\ncenter = [{x},{y},0]\nnormal = [0,1,0]\nradius = {radius}\nmaterial = 'red'\n"
+            )
+        };
+        assert!(found(super::covered, &lid(3.9998, 0.0, 1.0)));
+        assert!(warned(
+            &lid(3.9998, 0.0, 1.0),
+            "is covered: the disk at line"
+        ));
+        assert!(!found(super::covered, &lid(4.0002, 0.0, 1.0)), "behind it");
+        assert!(
+            !found(super::covered, &lid(3.99, 0.0, 1.0)),
+            "a shade at a distance"
+        );
+        assert!(
+            !found(super::covered, &lid(3.9998, 0.0, 0.2)),
+            "a small lid"
+        );
+        assert!(!found(super::covered, &lid(4.0, 0.0, 1.0)), "flush");
+        let ceiling = plane("[0,3.9998,0]", "[0,1,0]", "white");
+        assert!(found(super::covered, &ceiling));
+        assert!(!found(super::covered, &ceiling.replace("white", "glass")));
+        let lamp = light("[0,3.9998,0]", "[0,1,0]", "[1,1,1]");
+        assert!(found(super::covered, &lamp), "two lights face to face");
+        let slab =
+            "[[cylinder]]\nbase = [0,3,0]\ntop = [0,3.9998,0]\nradius = 2\nmaterial = 'red'\n";
+        assert!(found(super::covered, slab));
+    }
+
+    #[test]
+    fn lights_beyond_a_plane() {
+        // A wall between the eye and the light, and one that touches the light's rim.
+        assert!(found(super::unseen, &plane("[0,0,2]", "[0,0,-1]", "white")));
+        assert!(found(super::unseen, &plane("[0,0,2]", "[0,0,1]", "white")));
+        assert!(!found(super::unseen, &plane("[0,0,2]", "[0,0,1]", "glass")));
+        assert!(!found(
+            super::unseen,
+            &plane("[0,0,0.4]", "[0,0,1]", "white")
+        ));
+        assert!(!found(super::unseen, &plane("[0,0,5]", "[0,0,1]", "white")));
+        let hidden = plane("[0,0,2]", "[0,0,1]", "white");
+        assert!(warned(
+            &hidden,
+            "is on the other side, seen from the eye, of the plane at line"
+        ));
+    }
+
+    #[test]
+    fn lights_that_face_into_what_they_lie_on() {
+        let floor = plane("[0,0,0]", "[0,1,0]", "white");
+        let on_floor = |normal| floor.clone() + &light("[5,0,0]", normal, "[1,1,1]");
+        assert!(found(super::unseen, &on_floor("[0,-1,0]")));
+        assert!(!found(super::unseen, &on_floor("[0,1,0]")));
+        let drum = "[[cylinder]]\nbase = [5,0,0]\ntop = [5,1,0]\nradius = 0.6\nmaterial = 'red'\n";
+        let on_drum = |normal| drum.to_owned() + &light("[5,1,0]", normal, "[1,1,1]");
+        assert!(found(super::unseen, &on_drum("[0,-1,0]")));
+        assert!(!found(super::unseen, &on_drum("[0,1,0]")));
+        let wide = on_drum("[0,-1,0]").replace("radius = 0.6", "radius = 0.4");
+        assert!(!found(super::unseen, &wide), "it looks past the rim");
+    }
+
+    #[test]
+    fn lights_in_opaque_solids() {
+        let inside = light("[0,0.3,0]", "[0,1,0]", "[1,1,1]");
+        assert!(found(super::unseen, &inside));
+        assert!(
+            !found(super::unseen, &inside.replace("0.3", "0.9")),
+            "its rim sticks out"
+        );
+        assert!(!found(super::unseen, &inside.replace("'white'", "'glass'")));
+        let room = inside.replace("radius = 1\n", "radius = 30\n");
+        assert!(!found(super::unseen, &room), "with the eye");
+    }
+}

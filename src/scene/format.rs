@@ -1,0 +1,345 @@
+//! What each table of a scene file holds. This is the one place that says so: the parser walks it
+//! with the file in hand, the schema walks it to write down the keys.
+
+use super::value::{
+    Angle, Count, Direction, Exponent, Ior, LARGEST_STRATA, Point, Radiance, Radius, Resolution,
+    SMALLEST, Share, Text, Value, normalized,
+};
+use super::{Bsdf, Camera, Light, RenderHints, Shape};
+use crate::settings::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA};
+use glam::DVec3;
+
+/// Whether a key may be left out.
+pub(super) enum Need<T> {
+    Required,
+    /// May be left out; this is what the renderer then takes, if it is one value.
+    Optional(Option<T>),
+}
+
+/// What became of a key.
+pub(super) enum Found<T> {
+    Value(T),
+    Absent,
+    /// Breaks the rule of its kind, which has been reported.
+    Wrong,
+}
+
+/// A table that is being read or described.
+///
+/// Functions over it ask for all their keys before they use any value, so that every error is
+/// found, and a description is complete.
+pub(super) trait Table {
+    /// The value of `key`; its absence where it is required has been reported.
+    fn find<T: Value>(&mut self, key: &'static str, need: Need<T>, about: &'static str)
+    -> Found<T>;
+
+    /// Reports that the value of `key` breaks a rule that concerns more than it alone.
+    fn refuse(&mut self, key: &str, message: String);
+
+    /// A key that must be there; none when it was wrong.
+    fn required<T: Value>(&mut self, key: &'static str, about: &'static str) -> Option<T> {
+        match self.find(key, Need::Required, about) {
+            Found::Value(v) => Some(v),
+            Found::Absent | Found::Wrong => None,
+        }
+    }
+
+    /// A key with a default; none when it was wrong.
+    fn defaulted<T: Value + Copy>(
+        &mut self,
+        key: &'static str,
+        default: T,
+        about: &'static str,
+    ) -> Option<T> {
+        match self.find(key, Need::Optional(Some(default)), about) {
+            Found::Value(v) => Some(v),
+            Found::Absent => Some(default),
+            Found::Wrong => None,
+        }
+    }
+
+    /// A key that may be left out; none when it was, or was wrong.
+    fn optional<T: Value>(
+        &mut self,
+        key: &'static str,
+        default: Option<T>,
+        about: &'static str,
+    ) -> Option<T> {
+        match self.find(key, Need::Optional(default), about) {
+            Found::Value(v) => Some(v),
+            Found::Absent | Found::Wrong => None,
+        }
+    }
+}
+
+/// `[camera]`.
+pub(super) fn camera(t: &mut impl Table) -> Option<Camera> {
+    /// Sine of the smallest angle between `up` and the view; below it rounding decides what is up.
+    const PARALLEL: f64 = 1e-9;
+
+    let eye = t.required::<Point>("eye", "Position of the pinhole.");
+    let look_at = t.required::<Point>("look_at", "A point in the middle of the picture.");
+    let up = t.defaulted(
+        "up",
+        Direction(DVec3::Y),
+        "Points to the picture's top; any length, not parallel to the view.",
+    );
+    let vfov = t.required::<Angle>("vfov", "Vertical field of view in degrees.");
+    let resolution = t.required::<Resolution>("resolution", "Width and height in pixels.");
+
+    let (eye, look_at) = (eye?.0, look_at?.0);
+    let view = look_at - eye;
+    let view = normalized(view).filter(|_| view.length() >= SMALLEST);
+    let Some(view) = view else {
+        let message = format!("look_at is at eye, but must be at least {SMALLEST:e} away from it");
+        t.refuse("look_at", message);
+        return None;
+    };
+    let up = up?.0;
+    if view.cross(up).length() < PARALLEL {
+        let message = format!(
+            "up, along {}, is parallel to the view, along {}; it must not be",
+            brief(up),
+            brief(view)
+        );
+        t.refuse("up", message);
+        return None;
+    }
+    Some(Camera {
+        eye,
+        look_at,
+        up,
+        vfov: vfov?.0,
+        resolution: resolution?.0,
+    })
+}
+
+/// A vector for a message, to three digits.
+fn brief(v: DVec3) -> String {
+    // Adding 0 turns -0 into 0.
+    let round = |x: f64| (x * 1e3).round() / 1e3 + 0.0;
+    format!("[{}, {}, {}]", round(v.x), round(v.y), round(v.z))
+}
+
+/// `[render]`.
+pub(super) fn render(t: &mut impl Table) -> RenderHints {
+    let max_depth = t.optional(
+        "max_depth",
+        Some(Count::<1, { u32::MAX }>(DEFAULT_MAX_DEPTH)),
+        "Path vertices after the eye: 1 sees lights only, 2 adds direct light, and so on.",
+    );
+    let strata = t.optional(
+        "strata",
+        Some(Count::<1, LARGEST_STRATA>(DEFAULT_STRATA)),
+        "The pixel is divided into strata x strata jittered cells.",
+    );
+    let seed = t.optional(
+        "seed",
+        Some(Count::<0, { u32::MAX }>(0)),
+        "Seed of every random number.",
+    );
+    RenderHints {
+        max_depth: max_depth.map(|c| c.0),
+        strata: strata.map(|c| c.0),
+        seed: seed.map(|c| c.0),
+    }
+}
+
+/// The `type` of a material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MaterialKind {
+    Diffuse,
+    Mirror,
+    Dielectric,
+    Phong,
+}
+
+impl MaterialKind {
+    pub(super) const ALL: [Self; 4] = [Self::Diffuse, Self::Mirror, Self::Dielectric, Self::Phong];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Diffuse => "diffuse",
+            Self::Mirror => "mirror",
+            Self::Dielectric => "dielectric",
+            Self::Phong => "phong",
+        }
+    }
+
+    pub(super) fn about(self) -> &'static str {
+        match self {
+            Self::Diffuse => "Lambertian reflection; both sides.",
+            Self::Mirror => "Perfect mirror; both sides.",
+            Self::Dielectric => "Smooth boundary of a solid such as glass; not for disks.",
+            Self::Phong => {
+                "Modified Phong (Lafortune & Willems 1994); diffuse + specular at most 1 per channel."
+            }
+        }
+    }
+}
+
+/// `[material.NAME]` but for its `type`.
+pub(super) fn material(t: &mut impl Table, kind: MaterialKind) -> Option<Bsdf> {
+    match kind {
+        MaterialKind::Diffuse => {
+            let reflectance = t.required::<Share>("reflectance", "Hemispherical albedo.")?;
+            Some(Bsdf::Diffuse {
+                reflectance: reflectance.0,
+            })
+        }
+        MaterialKind::Mirror => {
+            let about = "Factor on the reflected radiance.";
+            let reflectance = t.defaulted("reflectance", Share(DVec3::ONE), about)?;
+            Some(Bsdf::Mirror {
+                reflectance: reflectance.0,
+            })
+        }
+        MaterialKind::Dielectric => {
+            /// Crown glass, the report's.
+            const GLASS: Ior = Ior(1.52);
+            let about = "Index of refraction, inside divided by outside.";
+            let ior = t.defaulted("ior", GLASS, about);
+            let about = "Tint, once per refraction.";
+            let transmittance = t.defaulted("transmittance", Share(DVec3::ONE), about);
+            Some(Bsdf::Dielectric {
+                ior: ior?.0,
+                transmittance: transmittance?.0,
+            })
+        }
+        MaterialKind::Phong => phong(t),
+    }
+}
+
+fn phong(t: &mut impl Table) -> Option<Bsdf> {
+    /// Decimal fractions such as 0.9 + 0.1 may come out above 1 by a rounding.
+    const ROUNDING: f64 = 1e-9;
+
+    let diffuse = t.required::<Share>("diffuse", "kd, albedo of the diffuse part.");
+    let specular = t.required::<Share>("specular", "ks, albedo of the whole lobe.");
+    let exponent = t.required::<Exponent>("exponent", "n: the lobe is the nth power of cosine.");
+    let (diffuse, specular) = (diffuse?.0, specular?.0);
+    let sum = diffuse + specular;
+    if let Some(i) = (0..3).find(|&i| sum[i] > 1.0 + ROUNDING) {
+        let message = format!(
+            "diffuse[{i}] + specular[{i}] is {} + {} = {}, but must be at most 1",
+            diffuse[i], specular[i], sum[i]
+        );
+        t.refuse("specular", message);
+        return None;
+    }
+    Some(Bsdf::Phong {
+        diffuse,
+        specular,
+        exponent: exponent?.0,
+    })
+}
+
+/// The tables of shapes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ShapeKind {
+    Sphere,
+    Plane,
+    Disk,
+    Cylinder,
+}
+
+impl ShapeKind {
+    /// In the order of [`Scene::primitives`](super::Scene::primitives).
+    pub(super) const ALL: [Self; 4] = [Self::Sphere, Self::Plane, Self::Disk, Self::Cylinder];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Sphere => "sphere",
+            Self::Plane => "plane",
+            Self::Disk => "disk",
+            Self::Cylinder => "cylinder",
+        }
+    }
+
+    pub(super) fn about(self) -> &'static str {
+        match self {
+            Self::Sphere => "A sphere.",
+            Self::Plane => {
+                "An infinite plane; if dielectric, the solid is on the side the normal points away from."
+            }
+            Self::Disk => "A flat disk; not for dielectric materials.",
+            Self::Cylinder => "A solid cylinder: side and two caps.",
+        }
+    }
+}
+
+/// `[[sphere]]`, `[[plane]]`, `[[disk]]` or `[[cylinder]]`, and the name of its material.
+pub(super) fn primitive(t: &mut impl Table, kind: ShapeKind) -> Option<(Shape, String)> {
+    let shape = match kind {
+        ShapeKind::Sphere => sphere(t),
+        ShapeKind::Plane => plane(t),
+        ShapeKind::Disk => disk(t),
+        ShapeKind::Cylinder => cylinder(t),
+    };
+    let material = t.required::<Text>("material", "NAME of a [material.NAME].");
+    Some((shape?, material?.0))
+}
+
+fn sphere(t: &mut impl Table) -> Option<Shape> {
+    let center = t.required::<Point>("center", "Centre.");
+    let radius = t.required::<Radius>("radius", "Radius.");
+    Some(Shape::Sphere {
+        center: center?.0,
+        radius: radius?.0,
+    })
+}
+
+fn plane(t: &mut impl Table) -> Option<Shape> {
+    let point = t.required::<Point>("point", "Any point of the plane.");
+    let normal = t.required::<Direction>("normal", "Perpendicular to the plane; any length.");
+    Some(Shape::Plane {
+        point: point?.0,
+        normal: normal?.0,
+    })
+}
+
+fn disk(t: &mut impl Table) -> Option<Shape> {
+    let center = t.required::<Point>("center", "Centre.");
+    let normal = t.required::<Direction>("normal", "Perpendicular to the disk; any length.");
+    let radius = t.required::<Radius>("radius", "Radius.");
+    Some(Shape::Disk {
+        center: center?.0,
+        normal: normal?.0,
+        radius: radius?.0,
+    })
+}
+
+fn cylinder(t: &mut impl Table) -> Option<Shape> {
+    let base = t.required::<Point>("base", "Centre of one cap.");
+    let top = t.required::<Point>("top", "Centre of the other cap.");
+    let radius = t.required::<Radius>("radius", "Radius.");
+    let (base, top) = (base?.0, top?.0);
+    // Shorter ones could not be told from nothing in f32, and squares in f64 are safe above.
+    if base.distance(top) < SMALLEST {
+        let message = format!("top is at base, but must be at least {SMALLEST:e} away from it");
+        t.refuse("top", message);
+        return None;
+    }
+    Some(Shape::Cylinder {
+        base,
+        top,
+        radius: radius?.0,
+    })
+}
+
+/// `[[light]]`, at `line` of the file.
+pub(super) fn light(t: &mut impl Table, line: usize) -> Option<Light> {
+    let center = t.required::<Point>("center", "Centre.");
+    let about = "Points to the side that emits; any length. The other side is black.";
+    let normal = t.required::<Direction>("normal", about);
+    let radius = t.required::<Radius>("radius", "Radius.");
+    let about = "Emitted radiance, the same in every direction of the front.";
+    let radiance = t.required::<Radiance>("radiance", about);
+    Some(Light {
+        center: center?.0,
+        normal: normal?.0,
+        radius: radius?.0,
+        radiance: radiance?.0,
+        line,
+    })
+}

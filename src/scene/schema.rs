@@ -1,0 +1,116 @@
+//! JSON Schema of scene files, for editors: completion, hover texts, and most errors while typing.
+
+use super::format::{self, Found, MaterialKind, Need, ShapeKind, Table};
+use super::value::{Text, Value};
+use serde_json::{Map, Value as Json, json};
+
+/// What `title` is, in schema and hover text.
+pub(super) const TITLE: &str = "What the picture is called.";
+
+/// The schema, draft 7, which TOML editors (Even Better TOML, taplo) understand.
+///
+/// It says all that concerns one key; what holds between keys (a camera looking along `up`,
+/// diffuse + specular above 1, names of materials) only [`parse`](super::parse) finds.
+pub fn schema() -> Json {
+    let mut properties = Map::new();
+    let mut title = Text::schema();
+    title["description"] = json!(TITLE);
+    properties.insert("title".into(), title);
+    let camera = describe("The pinhole camera.", format::camera);
+    properties.insert("camera".into(), camera);
+    let about = "How the file wants to be rendered; flags override it.";
+    let render = describe(about, format::render);
+    properties.insert("render".into(), render);
+    properties.insert(
+        "material".into(),
+        json!({
+            "description": "Materials by name: [material.NAME].",
+            "type": "object",
+            "additionalProperties": {"oneOf": MaterialKind::ALL.map(material)},
+        }),
+    );
+    for kind in ShapeKind::ALL {
+        let table = describe(kind.about(), |t| format::primitive(t, kind));
+        properties.insert(kind.name().into(), json!({"type": "array", "items": table}));
+    }
+    let about = "A disk luminaire; reflects nothing.";
+    let light = describe(about, |t| format::light(t, 0));
+    properties.insert(
+        "light".into(),
+        json!({"type": "array", "items": light, "minItems": 1}),
+    );
+
+    let some_primitive = ShapeKind::ALL.map(|kind| {
+        let name = kind.name();
+        json!({"required": [name], "properties": {name: {"minItems": 1}}})
+    });
+    json!({
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "etendue scene",
+        "description": "A scene for the path tracer etendue. Lengths share one arbitrary unit, \
+                        angles are degrees, colours and radiances linear RGB (Rec. 709).",
+        "type": "object",
+        "properties": properties,
+        "required": ["camera", "light"],
+        "anyOf": some_primitive,
+        "additionalProperties": false,
+    })
+}
+
+/// The keys of a material of `kind` besides `type`.
+pub(super) fn material_keys(kind: MaterialKind) -> Vec<String> {
+    let mut description = Description::default();
+    format::material(&mut description, kind);
+    description.properties.into_iter().map(|p| p.0).collect()
+}
+
+fn material(kind: MaterialKind) -> Json {
+    let mut table = describe(kind.about(), |t| format::material(t, kind));
+    table["title"] = json!(kind.name());
+    table["properties"]["type"] = json!({"const": kind.name(), "description": kind.about()});
+    if let Some(required) = table["required"].as_array_mut() {
+        required.push(json!("type"));
+    }
+    table
+}
+
+/// The table that `read` reads, as a schema.
+fn describe<T>(about: &str, read: impl FnOnce(&mut Description) -> T) -> Json {
+    let mut description = Description::default();
+    read(&mut description);
+    json!({
+        "description": about,
+        "type": "object",
+        "properties": description.properties,
+        "required": description.required,
+        "additionalProperties": false,
+    })
+}
+
+/// Writes down the keys that are asked for, and has none of them.
+#[derive(Default)]
+struct Description {
+    properties: Map<String, Json>,
+    required: Vec<&'static str>,
+}
+
+impl Table for Description {
+    fn find<T: Value>(
+        &mut self,
+        key: &'static str,
+        need: Need<T>,
+        about: &'static str,
+    ) -> Found<T> {
+        let mut schema = T::schema();
+        schema["description"] = json!(about);
+        match need {
+            Need::Required => self.required.push(key),
+            Need::Optional(Some(default)) => schema["default"] = default.to_json(),
+            Need::Optional(None) => {}
+        }
+        self.properties.insert(key.into(), schema);
+        Found::Absent
+    }
+
+    fn refuse(&mut self, _: &str, _: String) {}
+}

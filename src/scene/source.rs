@@ -1,0 +1,190 @@
+//! Places in the text of a scene file: from byte offsets to line and column, and to short quotes.
+
+use super::Diagnostic;
+use std::ops::Range;
+use std::path::Path;
+
+/// The most errors reported for one file; the rest are counted.
+const MAX_ERRORS: usize = 50;
+/// The most characters of the file quoted in a message.
+const MAX_QUOTE: usize = 40;
+
+/// The text of a file.
+pub(super) struct Source<'a> {
+    path: &'a Path,
+    text: &'a str,
+    /// Byte offset of the start of every line.
+    lines: Vec<usize>,
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn new(path: &'a Path, text: &'a str) -> Self {
+        let starts = text.bytes().enumerate().filter(|&(_, b)| b == b'\n');
+        Self {
+            path,
+            text,
+            lines: std::iter::once(0)
+                .chain(starts.map(|(i, _)| i + 1))
+                .collect(),
+        }
+    }
+
+    pub(super) fn path(&self) -> &'a Path {
+        self.path
+    }
+
+    pub(super) fn text(&self) -> &'a str {
+        self.text
+    }
+
+    /// Line, from 1, of a byte offset.
+    pub(super) fn line(&self, offset: usize) -> usize {
+        self.lines.partition_point(|&start| start <= offset)
+    }
+
+    /// A message about the character at `offset`, or about the file.
+    pub(super) fn diagnostic(&self, offset: Option<usize>, message: String) -> Diagnostic {
+        let (line, column) = offset.map_or((0, 0), |offset| {
+            let line = self.line(offset);
+            let start = self.lines[line - 1];
+            let before = self.text.get(start..offset.min(self.text.len()));
+            (line, 1 + before.map_or(0, |s| s.chars().count()))
+        });
+        Diagnostic {
+            path: self.path.to_owned(),
+            line,
+            column,
+            message,
+        }
+    }
+
+    /// The text at `span`, on one line and shortened.
+    pub(super) fn quote(&self, span: Range<usize>) -> String {
+        let text = self.text.get(span).unwrap_or_default();
+        // Enough for the quote: the text may be as long as the file.
+        let start: String = text.chars().take(8 * MAX_QUOTE).collect();
+        let one_line = start.split_whitespace().collect::<Vec<_>>().join(" ");
+        shorten(&one_line)
+    }
+}
+
+/// `text` without control characters, cut at [`MAX_QUOTE`] characters.
+pub(super) fn shorten(text: &str) -> String {
+    let mut short = String::new();
+    for (i, c) in text.chars().enumerate() {
+        if i == MAX_QUOTE {
+            short.push('…');
+            break;
+        }
+        if c.is_control() {
+            short.extend(c.escape_default());
+        } else {
+            short.push(c);
+        }
+    }
+    short
+}
+
+/// `name` in double quotes, shortened.
+pub(super) fn quoted(name: &str) -> String {
+    format!("\"{}\"", shorten(name))
+}
+
+/// The errors of one file.
+pub(super) struct Faults {
+    /// Byte offset, none for the whole file, and message.
+    found: Vec<(Option<usize>, String)>,
+    uncounted: usize,
+}
+
+impl Faults {
+    pub(super) fn new() -> Self {
+        Self {
+            found: Vec::new(),
+            uncounted: 0,
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.found.is_empty()
+    }
+
+    pub(super) fn push(&mut self, offset: Option<usize>, message: String) {
+        if self.found.len() < MAX_ERRORS {
+            self.found.push((offset, message));
+        } else {
+            self.uncounted += 1;
+        }
+    }
+
+    /// In file order, what concerns the whole file last.
+    pub(super) fn into_diagnostics(mut self, source: &Source) -> Vec<Diagnostic> {
+        self.found.sort_by_key(|f| f.0.unwrap_or(usize::MAX));
+        self.found.dedup();
+        let mut diagnostics: Vec<Diagnostic> = self
+            .found
+            .into_iter()
+            .map(|(offset, message)| source.diagnostic(offset, message))
+            .collect();
+        if self.uncounted > 0 {
+            diagnostics.push(source.diagnostic(None, format!("{} more errors", self.uncounted)));
+        }
+        diagnostics
+    }
+}
+
+/// `; did you mean "…"?` for the candidate most like `word`, if any is.
+pub(super) fn suggestion<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> String {
+    /// Share of letters that must agree: 0.6 takes one slip in three letters, two in five.
+    const ALIKE: f64 = 0.6;
+    // Longer words are no slips, and the distance is quadratic in length.
+    if word.len() > 100 {
+        return String::new();
+    }
+    let word = word.to_lowercase();
+    candidates
+        .into_iter()
+        .filter(|c| c.len() <= 100)
+        .map(|c| {
+            let alike = strsim::normalized_damerau_levenshtein(&word, &c.to_lowercase());
+            (alike, c)
+        })
+        .filter(|(alike, _)| *alike >= ALIKE)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(String::new, |(_, c)| {
+            format!("; did you mean {}?", quoted(c))
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters_and_crlf_ends_lines() {
+        let source = Source::new(Path::new("x.toml"), "a\r\nöäü b\n");
+        let at = source.text().find('b');
+        let d = source.diagnostic(at, "m".into());
+        assert_eq!(d.to_string(), "x.toml:2:5: m");
+        let end = source.diagnostic(Some(source.text().len()), "m".into());
+        assert_eq!((end.line, end.column), (3, 1));
+    }
+
+    #[test]
+    fn quotes_are_short_and_on_one_line() {
+        let text = format!("[1,\n   2, \u{7}{}]", "3".repeat(100));
+        let quote = Source::new(Path::new(""), &text).quote(0..text.len());
+        assert!(quote.starts_with("[1, 2, \\u{7}333"), "{quote}");
+        assert!(quote.chars().count() < 50);
+    }
+
+    #[test]
+    fn suggestions_are_near_misses_only() {
+        let keys = ["center", "radius", "material"];
+        assert_eq!(suggestion("Centre", keys), "; did you mean \"center\"?");
+        assert_eq!(suggestion("radios", keys), "; did you mean \"radius\"?");
+        assert_eq!(suggestion("radiance", keys), "");
+        assert_eq!(suggestion("ior", keys), "");
+        assert_eq!(suggestion(&"radius".repeat(50), keys), "");
+    }
+}

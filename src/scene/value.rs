@@ -1,0 +1,425 @@
+//! The kinds of value that scene files hold: each reads itself, states its rule, and describes itself
+//! as JSON Schema.
+
+use glam::DVec3;
+use serde_json::{Value as Json, json};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::DeValue;
+
+/// Largest magnitude of coordinates, and of radiance: its square is still a number in f32, which the
+/// kernels calculate in.
+pub const LARGEST: f64 = 1e15;
+/// Smallest radius and length: its square is still a normal number in f32.
+pub const SMALLEST: f64 = 1e-15;
+/// Indices of refraction lie between this and its inverse: their fourth power, which Fresnel's
+/// equations come near, is a normal number in f32.
+pub const LARGEST_IOR: f64 = 1e6;
+/// Largest Phong exponent; n + 2 and its logarithm stay far inside f32.
+pub const LARGEST_EXPONENT: f64 = 1e15;
+/// Width and height of a picture in pixels.
+pub const LARGEST_RESOLUTION: u32 = 65536;
+/// Strata a side; at 1024 one round already is a million samples a pixel.
+pub const LARGEST_STRATA: u32 = 1024;
+
+/// A place in the file that breaks a rule: its span, and the index in the array, if it is in one.
+pub(super) struct Wrong {
+    pub(super) span: Range<usize>,
+    pub(super) index: Option<usize>,
+}
+
+/// A kind of value.
+pub(super) trait Value: Sized {
+    /// What is allowed, to follow "must be".
+    fn rule() -> String;
+    /// The value, or the part of it that breaks the rule.
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong>;
+    /// Its type and limits as JSON Schema.
+    fn schema() -> Json;
+    /// As it would stand in a file.
+    fn to_json(&self) -> Json;
+}
+
+/// Numbers from `low` to `high`; both ends belong to it unless `open`.
+struct Interval {
+    low: f64,
+    high: f64,
+    open: bool,
+    /// Why there are limits that the quantity itself does not have.
+    why: &'static str,
+}
+
+const F32: &str = " (limits of f32 kernels)";
+const SHARE: Interval = Interval::closed(0.0, 1.0, "");
+const COORDINATE: Interval = Interval::closed(-LARGEST, LARGEST, F32);
+const LENGTH: Interval = Interval::closed(SMALLEST, LARGEST, F32);
+const LIGHT: Interval = Interval::closed(0.0, LARGEST, F32);
+const IOR: Interval = Interval::closed(1.0 / LARGEST_IOR, LARGEST_IOR, F32);
+const EXPONENT: Interval = Interval::closed(0.0, LARGEST_EXPONENT, F32);
+const FINITE: Interval = Interval::closed(-f64::MAX, f64::MAX, "");
+const ANGLE: Interval = Interval {
+    low: 0.0,
+    high: 180.0,
+    open: true,
+    why: "",
+};
+
+impl Interval {
+    const fn closed(low: f64, high: f64, why: &'static str) -> Self {
+        Self {
+            low,
+            high,
+            open: false,
+            why,
+        }
+    }
+
+    /// NaN lies in no interval.
+    fn holds(&self, x: f64) -> bool {
+        if self.open {
+            x > self.low && x < self.high
+        } else {
+            x >= self.low && x <= self.high
+        }
+    }
+
+    fn rule(&self) -> String {
+        let Self { low, high, why, .. } = self;
+        if self.open {
+            format!("above {low} and below {high}{why}")
+        } else {
+            format!("from {} to {}{why}", brief(*low), brief(*high))
+        }
+    }
+
+    fn schema(&self) -> Json {
+        if self.open {
+            json!({"type": "number", "exclusiveMinimum": self.low, "exclusiveMaximum": self.high})
+        } else if self.high == f64::MAX {
+            json!({"type": "number"})
+        } else {
+            json!({"type": "number", "minimum": self.low, "maximum": self.high})
+        }
+    }
+
+    fn number(&self, found: &Spanned<DeValue>) -> Option<f64> {
+        number(found.get_ref()).filter(|&x| self.holds(x))
+    }
+
+    fn read(&self, found: &Spanned<DeValue>) -> Result<f64, Wrong> {
+        self.number(found).ok_or_else(|| wrong(found))
+    }
+
+    fn read_three(&self, found: &Spanned<DeValue>) -> Result<DVec3, Wrong> {
+        let [x, y, z] = array(found, |v| self.number(v))?;
+        Ok(DVec3::new(x, y, z))
+    }
+
+    fn schema_three(&self) -> Json {
+        json!({"type": "array", "items": self.schema(), "minItems": 3, "maxItems": 3})
+    }
+}
+
+/// Large and small numbers as powers of ten: 1e15, not 1000000000000000.
+fn brief(x: f64) -> String {
+    if x != 0.0 && !(1e-3..1e6).contains(&x.abs()) {
+        format!("{x:e}")
+    } else {
+        x.to_string()
+    }
+}
+
+fn wrong(found: &Spanned<DeValue>) -> Wrong {
+    Wrong {
+        span: found.span(),
+        index: None,
+    }
+}
+
+/// Integers stand for floats; what overflows is infinite.
+fn number(found: &DeValue) -> Option<f64> {
+    match found {
+        DeValue::Float(x) => x.as_str().parse().ok(),
+        DeValue::Integer(_) => match whole(found) {
+            Some(i) => Some(i as f64),
+            None => Some(f64::INFINITY),
+        },
+        _ => None,
+    }
+}
+
+fn whole(found: &DeValue) -> Option<i128> {
+    let DeValue::Integer(i) = found else {
+        return None;
+    };
+    i128::from_str_radix(i.as_str(), i.radix()).ok()
+}
+
+fn count(found: &DeValue, low: u32, high: u32) -> Option<u32> {
+    let n = u32::try_from(whole(found)?).ok()?;
+    (low..=high).contains(&n).then_some(n)
+}
+
+/// An array of `N` values that `element` accepts.
+fn array<T, const N: usize>(
+    found: &Spanned<DeValue>,
+    element: impl Fn(&Spanned<DeValue>) -> Option<T>,
+) -> Result<[T; N], Wrong> {
+    let items = found.get_ref().as_array().ok_or_else(|| wrong(found))?;
+    if items.len() != N {
+        return Err(wrong(found));
+    }
+    let mut values = Vec::with_capacity(N);
+    for (i, item) in items.iter().enumerate() {
+        values.push(element(item).ok_or_else(|| Wrong {
+            span: item.span(),
+            index: Some(i),
+        })?);
+    }
+    values.try_into().map_err(|_| wrong(found))
+}
+
+/// `v` with length 1, however long or short it is; none for the null vector.
+pub(super) fn normalized(v: DVec3) -> Option<DVec3> {
+    // Scaled first: squares of coordinates beyond 1e±154 overflow or vanish.
+    let largest = v.abs().max_element();
+    (largest > 0.0).then(|| (v / largest).normalize())
+}
+
+/// A kind of value that is one number or three of them in an interval.
+macro_rules! numbers {
+    ($($(#[$doc:meta])* $name:ident: one of $interval:ident;)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy)]
+        pub(super) struct $name(pub(super) f64);
+        impl Value for $name {
+            fn rule() -> String {
+                format!("a number {}", $interval.rule())
+            }
+            fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+                $interval.read(found).map(Self)
+            }
+            fn schema() -> Json {
+                $interval.schema()
+            }
+            fn to_json(&self) -> Json {
+                json!(self.0)
+            }
+        }
+    )*};
+    ($($(#[$doc:meta])* $name:ident: three of $interval:ident;)*) => {$(
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy)]
+        pub(super) struct $name(pub(super) DVec3);
+        impl Value for $name {
+            fn rule() -> String {
+                format!("three numbers {}", $interval.rule())
+            }
+            fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+                $interval.read_three(found).map(Self)
+            }
+            fn schema() -> Json {
+                $interval.schema_three()
+            }
+            fn to_json(&self) -> Json {
+                json!(self.0.to_array())
+            }
+        }
+    )*};
+}
+
+numbers! {
+    /// A radius.
+    Radius: one of LENGTH;
+    /// A field of view in degrees.
+    Angle: one of ANGLE;
+    /// An index of refraction, inside / outside.
+    Ior: one of IOR;
+    /// A Phong exponent.
+    Exponent: one of EXPONENT;
+}
+
+numbers! {
+    /// A position.
+    Point: three of COORDINATE;
+    /// A share of the light, red, green and blue.
+    Share: three of SHARE;
+    /// An emitted radiance, red, green and blue.
+    Radiance: three of LIGHT;
+}
+
+/// A direction; unit length, whatever length the file has.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Direction(pub(super) DVec3);
+
+impl Value for Direction {
+    fn rule() -> String {
+        "three finite numbers, not all 0".into()
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        let v = FINITE.read_three(found)?;
+        normalized(v).map(Self).ok_or_else(|| wrong(found))
+    }
+
+    fn schema() -> Json {
+        let mut schema = FINITE.schema_three();
+        schema["contains"] = json!({"not": {"const": 0}});
+        schema
+    }
+
+    fn to_json(&self) -> Json {
+        json!(self.0.to_array())
+    }
+}
+
+/// Width and height in pixels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Resolution(pub(super) [u32; 2]);
+
+impl Value for Resolution {
+    fn rule() -> String {
+        format!("[width, height], two whole numbers from 1 to {LARGEST_RESOLUTION}")
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        array(found, |v| count(v.get_ref(), 1, LARGEST_RESOLUTION)).map(Self)
+    }
+
+    fn schema() -> Json {
+        let side = json!({"type": "integer", "minimum": 1, "maximum": LARGEST_RESOLUTION});
+        json!({"type": "array", "items": side, "minItems": 2, "maxItems": 2})
+    }
+
+    fn to_json(&self) -> Json {
+        json!(self.0)
+    }
+}
+
+/// A whole number from `LOW` to `HIGH`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Count<const LOW: u32, const HIGH: u32>(pub(super) u32);
+
+impl<const LOW: u32, const HIGH: u32> Value for Count<LOW, HIGH> {
+    fn rule() -> String {
+        format!("a whole number from {LOW} to {HIGH}")
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        let n = count(found.get_ref(), LOW, HIGH);
+        n.map(Self).ok_or_else(|| wrong(found))
+    }
+
+    fn schema() -> Json {
+        json!({"type": "integer", "minimum": LOW, "maximum": HIGH})
+    }
+
+    fn to_json(&self) -> Json {
+        json!(self.0)
+    }
+}
+
+/// A string.
+#[derive(Debug, Clone)]
+pub(super) struct Text(pub(super) String);
+
+impl Value for Text {
+    fn rule() -> String {
+        "a string".into()
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        let text = found.get_ref().as_str().ok_or_else(|| wrong(found))?;
+        Ok(Self(text.to_owned()))
+    }
+
+    fn schema() -> Json {
+        json!({"type": "string"})
+    }
+
+    fn to_json(&self) -> Json {
+        json!(self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read<T: Value>(text: &str) -> Option<T> {
+        T::read(&DeValue::parse(text).expect("TOML")).ok()
+    }
+
+    #[test]
+    fn numbers_in_every_notation() {
+        for (text, value) in [
+            ("3", 3.0),
+            ("0x10", 16.0),
+            ("1_000.5", 1000.5),
+            ("+1e-3", 1e-3),
+            ("1_0", 10.0),
+        ] {
+            let radius = read::<Radius>(text).map(|r| r.0);
+            assert_eq!(radius, Some(value), "{text}");
+        }
+        let bad = [
+            "0",
+            "-1",
+            "inf",
+            "nan",
+            "1e400",
+            "2e15",
+            "1e-16",
+            "true",
+            "\"1\"",
+            "[1]",
+            "99999999999999999999999999999999999999999999999",
+        ];
+        for text in bad {
+            assert!(read::<Radius>(text).is_none(), "{text}");
+        }
+    }
+
+    #[test]
+    fn open_ends_are_outside_and_closed_ones_inside() {
+        assert!(read::<Angle>("0").is_none() && read::<Angle>("180.0").is_none());
+        assert!(read::<Angle>("179.9").is_some());
+        assert!(read::<Share>("[0, 1, 0.5]").is_some());
+        assert!(read::<Share>("[0, 1.0000001, 0.5]").is_none());
+        assert!(read::<Count<1, 4>>("4").is_some() && read::<Count<1, 4>>("5").is_none());
+        assert!(read::<Count<0, { u32::MAX }>>("4294967296").is_none());
+        assert!(read::<Resolution>("[65536, 1]").is_some());
+        assert!(read::<Resolution>("[65537, 1]").is_none());
+        assert!(read::<Resolution>("[512.0, 384]").is_none());
+    }
+
+    #[test]
+    fn directions_of_any_length_become_unit_vectors() {
+        for text in [
+            "[0, 0, 5e-324]",
+            "[1e308, 1e308, -1e308]",
+            "[3e-200, 4e-200, 0]",
+            "[0, 1, 1e-300]",
+        ] {
+            let d = read::<Direction>(text).expect(text).0;
+            // Two roundings of a normalisation in f64.
+            assert!((d.length() - 1.0).abs() < 1e-15, "{text}: {d}");
+        }
+        let d = read::<Direction>("[3e-320, 4e-320, 0]")
+            .expect("denormal")
+            .0;
+        // Denormals near 1e-320 have three digits.
+        assert!((d - DVec3::new(0.6, 0.8, 0.0)).length() < 1e-3, "{d}");
+        assert!(read::<Direction>("[0, 0.0, -0.0]").is_none());
+        assert!(read::<Direction>("[0, inf, 0]").is_none());
+    }
+
+    #[test]
+    fn the_offending_element_is_named() {
+        let found = DeValue::parse("[0.1, 2, 0.3]").expect("TOML");
+        let Err(wrong) = Share::read(&found) else {
+            panic!("2 is above 1");
+        };
+        assert_eq!((wrong.index, wrong.span), (Some(1), 6..7));
+    }
+}

@@ -1,0 +1,159 @@
+//! naga validates the kernel of every combination of primitives, materials and modes: no GPU needed.
+
+mod common;
+
+use common::scene;
+use etendue::kernel::{Access, compose};
+use etendue::settings::{Integrator, LightParts, Overrides, Settings};
+use etendue::world::World;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+const MATERIALS: [(&str, &str); 4] = [
+    (
+        "diffuse",
+        "type = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]",
+    ),
+    ("mirror", "type = \"mirror\""),
+    ("glass", "type = \"dielectric\""),
+    (
+        "gloss",
+        "type = \"phong\"\ndiffuse = [0.3, 0.3, 0.3]\nspecular = [0.4, 0.4, 0.4]\nexponent = 60.0",
+    ),
+];
+
+const SHAPES: [(&str, &str); 5] = [
+    ("sphere", "center = [0.0, 0.0, 0.0]\nradius = 0.5"),
+    (
+        "plane",
+        "point = [0.0, -1.0, 0.0]\nnormal = [0.0, 1.0, 0.0]",
+    ),
+    (
+        "disk",
+        "center = [0.0, 0.0, -1.0]\nnormal = [0.0, 0.0, 1.0]\nradius = 0.5",
+    ),
+    (
+        "cylinder",
+        "base = [1.0, 0.0, 0.0]\ntop = [1.0, 1.0, 0.0]\nradius = 0.2",
+    ),
+    // Far larger than the rest: the curvature form.
+    ("sphere", "center = [0.0, -1e6, 0.0]\nradius = 999999.0"),
+];
+
+/// A scene with the shapes and materials whose bits are set, every shape with every material that it may have.
+fn text(shapes: usize, materials: usize, lights: usize, eye_inside: bool) -> Option<String> {
+    let mut s = format!(
+        "[camera]\neye = [0.0, {}, {}]\nlook_at = [0.0, 0.2, -3.0]\nvfov = 40.0\nresolution = [4, 3]\n",
+        if eye_inside { "0.1" } else { "0.5" },
+        if eye_inside { "0.1" } else { "3.0" },
+    );
+    let mut any = false;
+    for (m, (name, body)) in MATERIALS
+        .iter()
+        .enumerate()
+        .filter(|(m, _)| materials >> m & 1 == 1)
+    {
+        s += &format!("[material.{name}]\n{body}\n");
+        for (_, (kind, body)) in SHAPES
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| shapes >> k & 1 == 1)
+        {
+            if !(m == 2 && *kind == "disk") {
+                any = true;
+                s += &format!("[[{kind}]]\n{body}\nmaterial = \"{name}\"\n");
+            }
+        }
+    }
+    for i in 0..lights {
+        s += &format!(
+            "[[light]]\ncenter = [{i}.0, 2.0, 0.0]\nnormal = [0.0, -1.0, 0.0]\nradius = 0.3\nradiance = [5.0, 5.0, 5.0]\n"
+        );
+    }
+    any.then_some(s)
+}
+
+fn validate(wgsl: &str, what: &str) {
+    let module = naga::front::wgsl::parse_str(wgsl)
+        .unwrap_or_else(|e| panic!("{what}: {}\n{wgsl}", e.emit_to_string(wgsl)));
+    Validator::new(ValidationFlags::all(), Capabilities::default())
+        .validate(&module)
+        .unwrap_or_else(|e| panic!("{what}: {}", e.emit_to_string(wgsl)));
+}
+
+#[test]
+fn every_combination_of_primitives_and_materials_is_valid() {
+    let mut count = 0;
+    for shapes in 1..1 << SHAPES.len() {
+        for materials in 1..1 << MATERIALS.len() {
+            let lights = 1 + (shapes + materials) % 2;
+            let Some(text) = text(shapes, materials, lights, (shapes ^ materials) & 4 == 4) else {
+                continue;
+            };
+            let scene = scene(&text);
+            let settings = Settings::resolve(&scene, &Overrides::default());
+            let world = World::new(&scene, settings.size);
+            for access in [Access::Baked, Access::Buffers] {
+                validate(
+                    &compose(&world, &settings, Some(access)).wgsl,
+                    &format!("{access:?}\n{text}"),
+                );
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 900, "only {count} kernels");
+}
+
+#[test]
+fn every_mode_is_valid() {
+    let everything = scene(&text(31, 15, 3, false).expect("has primitives"));
+    let only_mirrors = scene(&text(1, 2, 1, false).expect("has primitives"));
+    for scene in [&everything, &only_mirrors] {
+        for light in 1..8 {
+            for integrator in [Integrator::Path, Integrator::Whitted] {
+                for shadow_rays in [1, 4] {
+                    for (strata, max_depth) in [(1, 1), (2, 2), (3, 64)] {
+                        let flags = Overrides {
+                            strata: Some(strata),
+                            max_depth: Some(max_depth),
+                            shadow_rays: Some(shadow_rays),
+                            light: Some(LightParts {
+                                emitted: light & 1 == 1,
+                                direct: light & 2 == 2,
+                                indirect: light & 4 == 4,
+                            }),
+                            integrator: Some(integrator),
+                            ..Overrides::default()
+                        };
+                        let settings = Settings::resolve(scene, &flags);
+                        let world = World::new(scene, settings.size);
+                        for access in [Access::Baked, Access::Buffers] {
+                            validate(
+                                &compose(&world, &settings, Some(access)).wgsl,
+                                &format!("{access:?} {flags:?}"),
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_kernel_holds_only_what_its_scene_needs() {
+    let scene = scene(&text(2, 1, 1, false).expect("has primitives"));
+    let settings = Settings::resolve(&scene, &Overrides::default());
+    let wgsl = compose(&World::new(&scene, settings.size), &settings, None).wgsl;
+    for absent in [
+        "cylinder",
+        "sphere_",
+        "refract",
+        "mirrored",
+        "phong",
+        "choose_light(p: vec3f, n: vec3f, u: f32, v",
+    ] {
+        assert!(!wgsl.contains(absent), "a diffuse plane needs no {absent}");
+    }
+    assert!(wgsl.contains("plane_front") && wgsl.contains("sample_cosine"));
+}
