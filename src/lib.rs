@@ -7,6 +7,7 @@
 //!
 //! The CPU [`reference`] takes the same [`world::World`] and gives the same [`film::Film`].
 
+pub mod cli;
 pub mod engine;
 pub mod film;
 pub mod gpu;
@@ -14,6 +15,7 @@ pub mod kernel;
 pub mod output;
 pub mod provenance;
 pub mod reference;
+pub mod run;
 pub mod scene;
 pub mod settings;
 pub mod stats;

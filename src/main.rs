@@ -1,1 +1,7 @@
-fn main() {}
+//! The `etendue` program: see `etendue --help`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    etendue::cli::main()
+}

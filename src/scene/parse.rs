@@ -43,6 +43,12 @@ fn one_a_line(diagnostics: &[Diagnostic]) -> String {
 
 /// The scene in the file at `path`, of at most [`MAX_FILE_BYTES`].
 pub fn read(path: &Path) -> Result<Scene, ReadError> {
+    let text = read_text(path)?;
+    parse_str(path, &text).map_err(ReadError::Invalid)
+}
+
+/// The text of the file at `path`, of at most [`MAX_FILE_BYTES`], for [`parse_str`].
+pub fn read_text(path: &Path) -> Result<String, ReadError> {
     let io = |source| ReadError::Io {
         path: path.to_owned(),
         source,
@@ -72,10 +78,10 @@ pub fn read(path: &Path) -> Result<Scene, ReadError> {
         )));
     }
 
-    match std::str::from_utf8(&bytes) {
-        Ok(text) => parse_str(path, text).map_err(ReadError::Invalid),
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(text),
         Err(error) => {
-            let (good, bad) = bytes.split_at(error.valid_up_to());
+            let (good, bad) = error.as_bytes().split_at(error.utf8_error().valid_up_to());
             let good = String::from_utf8_lossy(good);
             let message = format!(
                 "byte 0x{:02x} is not UTF-8, but a scene file is UTF-8 text",

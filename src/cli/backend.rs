@@ -1,0 +1,73 @@
+//! Chooses what renders: a real GPU, else a software adapter, else the CPU reference.
+
+use super::args::Backend;
+use super::failure::Failure;
+use crate::engine::{Engine, MAX_TILE_PIXELS};
+use crate::gpu::{self, GpuEngine, GpuError};
+use crate::reference::{CpuEngine, Estimator};
+use crate::settings::Settings;
+use crate::world::World;
+
+/// How to come by an adapter, for those who have none.
+pub const GET_ADAPTER: &str = "apt-get install mesa-vulkan-drivers";
+
+/// Pixels that the CPU reference is given at once: a sample of each takes a fraction of a second.
+const CPU_TILE_PIXELS: u64 = 1 << 16;
+
+/// An engine, and what the renderer must know about it.
+pub struct Chosen {
+    /// What renders.
+    pub engine: Box<dyn Engine>,
+    /// Seconds that making the kernel took.
+    pub compile_seconds: f64,
+    /// The kernel made for the scene, if there is one.
+    pub wgsl: Option<String>,
+    /// The most pixels to give it at once.
+    pub tile_pixels: u64,
+    /// Why it is not a faster one, when that was not the user's choice.
+    pub note: Option<String>,
+}
+
+/// The engine that `backend` and `adapter` ask for, ready for this scene.
+pub fn choose(
+    backend: Backend,
+    adapter: Option<&str>,
+    world: &World,
+    settings: &Settings,
+) -> Result<Chosen, Failure> {
+    if backend == Backend::Cpu {
+        return Ok(cpu(world, settings, None));
+    }
+    let choice = gpu::Choice {
+        name: adapter.map(str::to_owned),
+    };
+    match GpuEngine::new(&choice, world, settings, None) {
+        Ok(engine) => Ok(Chosen {
+            compile_seconds: engine.compile_seconds(),
+            wgsl: Some(engine.kernel().wgsl.clone()),
+            engine: Box::new(engine),
+            tile_pixels: MAX_TILE_PIXELS,
+            note: None,
+        }),
+        Err(e) if backend == Backend::Auto && adapter.is_none() => {
+            let faster = match e {
+                GpuError::NoAdapter(_) => format!("; for a faster one: {GET_ADAPTER}"),
+                GpuError::Unable { .. } => String::new(),
+            };
+            let note = format!("{e}; rendering on the CPU reference{faster}");
+            Ok(cpu(world, settings, Some(note)))
+        }
+        Err(e) => Err(Failure::Device(e.to_string())),
+    }
+}
+
+fn cpu(world: &World, settings: &Settings, note: Option<String>) -> Chosen {
+    let engine = CpuEngine::new(world.clone(), settings.clone(), Estimator::LightSampling);
+    Chosen {
+        engine: Box::new(engine),
+        compile_seconds: 0.0,
+        wgsl: None,
+        tile_pixels: CPU_TILE_PIXELS,
+        note,
+    }
+}

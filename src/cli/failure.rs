@@ -1,0 +1,86 @@
+//! Why a command ends without success, and the exit status that says so.
+
+use crate::engine::EngineError;
+use crate::output::FileError;
+use crate::scene::Diagnostic;
+use crate::scene::parse::ReadError;
+
+/// Why a command ended without success. [`Failure::status`] is the one map to exit statuses, and
+/// [`Failure::print`] the one place that shows them.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// A bad command line, or inputs that don't fit together.
+    #[error("{0}")]
+    Input(String),
+    /// A scene file's content is wrong; one message for each place.
+    #[error("{} errors in the scene", .0.len())]
+    Scene(Vec<Diagnostic>),
+    /// No usable adapter, or the device failed.
+    #[error("{0}")]
+    Device(String),
+    /// A file can't be had, or its content is wrong.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A signal came, and what there was has been saved.
+    #[error("interrupted")]
+    Interrupted {
+        /// SIGINT is 2, SIGTERM 15.
+        signal: u8,
+    },
+    /// Everything has been said already; only the exit status is left.
+    #[error("failed")]
+    Said(u8),
+}
+
+impl Failure {
+    /// The exit status.
+    pub fn status(&self) -> u8 {
+        match self {
+            Failure::Input(_) | Failure::Scene(_) => 2,
+            Failure::Device(_) => 3,
+            Failure::File(e) if e.is_content() => 2,
+            Failure::File(_) => 4,
+            Failure::Interrupted { signal } => 128 + signal,
+            Failure::Said(status) => *status,
+        }
+    }
+
+    /// Shows it on stderr: `error: `, the message, and the chain of causes.
+    pub fn print(&self) {
+        match self {
+            Failure::Scene(diagnostics) => {
+                for d in diagnostics {
+                    super::say!("error: {d}");
+                }
+            }
+            // The run's closing lines have said so.
+            Failure::Interrupted { .. } | Failure::Said(_) => {}
+            _ => {
+                let mut text = format!("error: {self}");
+                let mut cause = std::error::Error::source(self);
+                while let Some(c) = cause {
+                    text += &format!(": {c}");
+                    cause = c.source();
+                }
+                super::say!("{text}");
+            }
+        }
+    }
+}
+
+impl From<EngineError> for Failure {
+    fn from(e: EngineError) -> Self {
+        Failure::Device(e.to_string())
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(e: ReadError) -> Self {
+        match e {
+            ReadError::Io { path, source } => {
+                FileError::io(&path, "cannot read the scene", &source).into()
+            }
+            ReadError::Invalid(diagnostics) => Failure::Scene(diagnostics),
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Whether a picture fits into memory, asked before anything is allocated.
+
+use super::failure::Failure;
+use std::fs;
+
+/// Bytes that a pixel of the film takes: four replicates of four f64 sums, and of four f32 sums of the block
+/// in progress.
+const FILM_BYTES: u64 = 128 + 64;
+
+/// Bytes that a pixel takes while pictures are written: nine f32 channels and a count.
+const OUTPUT_BYTES: u64 = 40;
+
+/// Refuses a picture part of `pixels` pixels that memory cannot hold, with the numbers.
+pub fn check(pixels: u64) -> Result<(), Failure> {
+    match available() {
+        Some(have) if pixels.saturating_mul(FILM_BYTES + OUTPUT_BYTES) > have => {
+            Err(Failure::Device(format!(
+                "a film of {:.1} million pixels takes {:.1} GB and {:.1} GB are free: render a smaller --size, or \
+                 a --region at a time",
+                pixels as f64 / 1e6,
+                (pixels * (FILM_BYTES + OUTPUT_BYTES)) as f64 / 1e9,
+                have as f64 / 1e9,
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Bytes that this process may still take, as far as the system tells (Linux).
+fn available() -> Option<u64> {
+    let system = mem_available(&fs::read_to_string("/proc/meminfo").ok()?)?;
+    let number = |path| fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
+    // In a container the limit of its control group can lie below what the machine has.
+    let group = number("/sys/fs/cgroup/memory.max")
+        .zip(number("/sys/fs/cgroup/memory.current"))
+        .map_or(u64::MAX, |(most, now)| most.saturating_sub(now));
+    Some(system.min(group))
+}
+
+/// `MemAvailable` of `/proc/meminfo`, in bytes.
+fn mem_available(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find(|l| l.starts_with("MemAvailable:"))?;
+    let kib: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kib * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_picture_is_refused_with_numbers_and_a_small_one_is_not() {
+        check(512 * 384).unwrap();
+        if available().is_some() {
+            let message = check(1 << 40).unwrap_err().to_string();
+            assert!(message.contains("255086.7 GB"), "{message}");
+        }
+    }
+
+    #[test]
+    fn meminfo_is_read() {
+        let text = "MemTotal:  16 kB\nMemFree: 1 kB\nMemAvailable:   12 kB\n";
+        assert_eq!(mem_available(text), Some(12 * 1024));
+        assert_eq!(mem_available("nothing"), None);
+    }
+}

@@ -1,0 +1,80 @@
+//! The command line: one file for each command, and what they share.
+
+mod adapters;
+mod args;
+mod backend;
+mod check;
+mod develop;
+mod failure;
+mod memory;
+mod merge;
+mod plan;
+mod progress;
+mod render;
+mod saver;
+mod schema;
+mod signals;
+mod values;
+
+use crate::output::FileError;
+use args::{Cli, Command};
+use clap::Parser;
+use failure::Failure;
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Writes a line to stderr. Unlike `eprintln!` it does not panic when nobody listens.
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+pub(crate) use say;
+
+/// Runs the program: parses the command line, does what it says, and turns a failure into its
+/// message and exit status.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Help and version go to stdout and are no error; a reader that has gone is none either.
+            let _ = e.print();
+            return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
+        }
+    };
+    let done = match cli.command {
+        Command::Render(args) => render::render(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Develop(args) => develop::develop(&args),
+        Command::Merge(args) => merge::merge(&args),
+        Command::Adapters => adapters::adapters(),
+        Command::Schema => schema::schema(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.print();
+            ExitCode::from(failure.status())
+        }
+    }
+}
+
+/// Writes data to stdout. A reader that has seen enough (`| head`) is no failure.
+fn write_stdout(data: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(data.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(FileError::io(Path::new("stdout"), "cannot write", &e).into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Gives rayon `--threads` threads; one for each core without.
+fn set_threads(threads: Option<u16>) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0).into());
+    // Fails only when the pool stands already, and a process runs one command.
+    let _ = pool.build_global();
+}

@@ -1,0 +1,189 @@
+//! What a render is to do: which pixels, which samples, and what ends it.
+
+use super::args::RenderArgs;
+use super::failure::Failure;
+use super::progress::{clock, percent};
+use super::values::MAX_SAMPLES;
+use crate::film::Film;
+use crate::film::coverage::{Coverage, Rect};
+use crate::settings::Settings;
+use std::ops::Range;
+use std::path::Path;
+
+/// Samples a pixel when no stop condition is given.
+const DEFAULT_SPP: u64 = 256;
+
+/// The pixels to render: the regions asked for, or the whole picture. A region that reaches out of
+/// the picture is refused.
+pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Failure> {
+    let [width, height] = settings.size;
+    if args.region.is_empty() {
+        return Ok(vec![Rect::whole(settings.size)]);
+    }
+    for r in &args.region {
+        if r.x1 > width || r.y1 > height {
+            return Err(Failure::Input(format!(
+                "--region {}: it reaches out of the picture of {width}x{height} pixels",
+                rect_text(r)
+            )));
+        }
+    }
+    Ok(args.region.clone())
+}
+
+/// The smallest rectangle around all regions, of which there is at least one.
+pub fn bounds(regions: &[Rect]) -> Rect {
+    regions[1..].iter().fold(regions[0], |a, b| a.union(b))
+}
+
+/// Refuses regions that a film of another part of the picture has no room for.
+pub fn check_bounds(path: &Path, film: &Film, bounds: Rect) -> Result<(), Failure> {
+    if film.bounds.union(&bounds) == film.bounds {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{}: this film holds the part {} of the picture, and the part asked for is {}; render the rest into a film \
+         of its own, and merge",
+        path.display(),
+        rect_text(&film.bounds),
+        rect_text(&bounds)
+    )))
+}
+
+/// A rectangle as `--region` reads it.
+fn rect_text(r: &Rect) -> String {
+    format!("{},{},{},{}", r.x0, r.y0, r.x1, r.y1)
+}
+
+/// The sample numbers that every pixel of `regions` is to have in the end.
+pub fn samples(
+    args: &RenderArgs,
+    settings: &Settings,
+    regions: &[Rect],
+    held: &Coverage,
+) -> Result<Range<u64>, Failure> {
+    if let Some(range) = &args.samples {
+        return Ok(range.clone());
+    }
+    let by_rays = match args.rays {
+        None => None,
+        Some(rays) => Some(
+            rays.checked_mul(settings.round())
+                .filter(|&n| n <= MAX_SAMPLES)
+                .ok_or_else(|| {
+                    let strata = settings.strata;
+                    Failure::Input(format!(
+                        "--rays {rays}: with {strata} x {strata} strata that is more than {MAX_SAMPLES} samples a pixel"
+                    ))
+                })?,
+        ),
+    };
+    let wanted = match [args.spp, by_rays].into_iter().flatten().min() {
+        Some(n) => n,
+        None if args.time.is_some() || args.error.is_some() => MAX_SAMPLES,
+        None => DEFAULT_SPP,
+    };
+    Ok(0..end_for(wanted, regions, held))
+}
+
+/// The end of the range from 0 that brings every pixel to `wanted` samples, those included that it holds beyond.
+fn end_for(wanted: u64, regions: &[Rect], held: &Coverage) -> u64 {
+    let regions = Rect::disjoint(regions);
+    let mut end = 0;
+    let mut bare: u64 = regions.iter().map(Rect::area).sum();
+    for (rect, ranges) in held.cells() {
+        let inside = regions.iter().filter_map(|r| r.intersection(&rect));
+        let pixels: u64 = inside.map(|r| r.area()).sum();
+        if pixels > 0 {
+            bare -= pixels;
+            end = end.max(end_for_pixel(wanted, ranges));
+        }
+    }
+    if bare > 0 { wanted } else { end }
+}
+
+/// [`end_for`] for a pixel that holds `ranges` (sorted, disjoint).
+fn end_for_pixel(wanted: u64, ranges: &[Range<u64>]) -> u64 {
+    let held: u64 = ranges.iter().map(|r| r.end - r.start).sum();
+    let mut lacking = wanted.saturating_sub(held);
+    if lacking == 0 {
+        return 0;
+    }
+    let mut at = 0;
+    for r in ranges {
+        let gap = r.start - at;
+        if lacking <= gap {
+            break;
+        }
+        lacking -= gap;
+        at = r.end;
+    }
+    at + lacking
+}
+
+/// `1 sample a pixel`, `2 samples a pixel`.
+pub fn count(samples: u64) -> String {
+    let s = if samples == 1 { "" } else { "s" };
+    format!("{samples} sample{s} a pixel")
+}
+
+/// What will end the run, for the start-up line.
+pub fn ends(args: &RenderArgs, samples: &Range<u64>) -> String {
+    let mut conditions = Vec::new();
+    if let Some(range) = &args.samples {
+        conditions.push(format!("samples {}..{} are done", range.start, range.end));
+    } else if samples.end < MAX_SAMPLES {
+        conditions.push(count(samples.end));
+    }
+    if let Some(error) = args.error {
+        conditions.push(format!("relative error {}", percent(error)));
+    }
+    if let Some(time) = args.time {
+        conditions.push(format!("{} of rendering", clock(time.as_secs_f64())));
+    }
+    format!("until {}", conditions.join(", or "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rect(x0: u32, y0: u32, x1: u32, y1: u32) -> Rect {
+        Rect { x0, y0, x1, y1 }
+    }
+
+    #[test]
+    fn what_a_film_holds_counts() {
+        let whole = rect(0, 0, 4, 4);
+        let end = |held: &[(u64, u64)], wanted| {
+            let mut c = Coverage::default();
+            for &(a, b) in held {
+                c.add(whole, a..b);
+            }
+            end_for(wanted, &[whole], &c)
+        };
+        assert_eq!(end(&[], 100), 100);
+        assert_eq!(end(&[(0, 40)], 100), 100);
+        assert_eq!(end(&[(512, 1024)], 512), 0);
+        assert_eq!(end(&[(512, 1024)], 600), 88);
+        assert_eq!(end(&[(10, 20), (30, 40)], 35), 25);
+        assert_eq!(end(&[(10, 20)], 10), 0);
+        assert_eq!(end(&[(10, 20), (30, 40)], 45), 45);
+    }
+
+    #[test]
+    fn pixels_that_hold_nothing_need_all() {
+        let mut c = Coverage::default();
+        c.add(rect(0, 0, 2, 4), 0..500);
+        assert_eq!(end_for(100, &[rect(0, 0, 4, 4)], &c), 100);
+        assert_eq!(end_for(100, &[rect(0, 0, 2, 2), rect(1, 1, 2, 3)], &c), 0);
+    }
+
+    #[test]
+    fn bounds_hold_all_regions() {
+        assert_eq!(
+            bounds(&[rect(4, 4, 6, 6), rect(1, 5, 2, 9)]),
+            rect(1, 4, 6, 9)
+        );
+    }
+}

@@ -1,0 +1,151 @@
+//! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere.
+
+use super::args::{ProgressStyle, Talk};
+use crate::run::Tally;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Steps of the bar; the last one is never shown before the end.
+const STEPS: u64 = 1000;
+
+/// Between two lines.
+const LINE_EVERY: Duration = Duration::from_secs(5);
+
+/// What shows progress.
+pub enum Progress {
+    /// Nothing does.
+    Silent,
+    /// A line every few seconds, the last one at this time.
+    Lines(Instant),
+    /// A bar.
+    Bar(ProgressBar),
+}
+
+impl Progress {
+    /// What the flags ask for.
+    pub fn new(talk: &Talk) -> Self {
+        match talk.progress {
+            _ if talk.quiet => Progress::Silent,
+            ProgressStyle::None => Progress::Silent,
+            ProgressStyle::Auto if std::io::stderr().is_terminal() => {
+                let style =
+                    BarStyle::with_template("{bar:32} {msg}").unwrap_or(BarStyle::default_bar());
+                let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
+                Progress::Bar(bar.with_style(style))
+            }
+            _ => Progress::Lines(Instant::now()),
+        }
+    }
+
+    /// Shows where the run stands.
+    pub fn show(&mut self, tally: &Tally) {
+        match self {
+            Progress::Silent => {}
+            Progress::Lines(last) if last.elapsed() < LINE_EVERY => {}
+            Progress::Lines(last) => {
+                *last = Instant::now();
+                super::say!("{}", describe(tally));
+            }
+            Progress::Bar(bar) => {
+                let fraction = tally.forecast.map_or(0.0, |f| f.fraction);
+                let done = (fraction * STEPS as f64) as u64;
+                bar.set_position(done.min(STEPS - 1));
+                bar.set_message(describe(tally));
+            }
+        }
+    }
+
+    /// Says something without tearing the bar.
+    pub fn say(&self, text: &str) {
+        match self {
+            Progress::Bar(bar) => bar.suspend(|| super::say!("{text}")),
+            _ => super::say!("{text}"),
+        }
+    }
+
+    /// Clears the bar, so that the closing lines stand alone.
+    pub fn finish(&mut self) {
+        if let Progress::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// One line: samples, per cent, error so far, time left. Never says 100 %.
+fn describe(tally: &Tally) -> String {
+    let mut text = format!("{:.0} samples", tally.samples.floor());
+    if let Some(f) = tally.forecast {
+        text += &format!(", {:.0} %", (f.fraction * 100.0).floor().min(99.0));
+        text += &format!(", {} left", clock(f.left));
+    }
+    if let Some((_, error)) = tally.error {
+        text += &format!(", relative error {}", percent(error));
+    }
+    text
+}
+
+/// Three digits and a per cent sign.
+pub fn percent(error: f64) -> String {
+    let p = error * 100.0;
+    let digits = if p >= 10.0 {
+        1
+    } else if p >= 1.0 {
+        2
+    } else {
+        3
+    };
+    format!("{p:.digits$} %")
+}
+
+/// Seconds as people say them: 4.2 s, 42 s, 3 min 20 s, 2 h 5 min.
+pub fn clock(seconds: f64) -> String {
+    let whole = seconds.round() as u64;
+    match whole {
+        0..=9 => format!("{seconds:.1} s"),
+        10..=119 => format!("{whole} s"),
+        120..=7199 => format!("{} min {} s", whole / 60, whole % 60),
+        _ => format!("{} h {} min", whole / 3600, whole % 3600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::Forecast;
+
+    #[test]
+    fn a_line_never_says_all_is_done() {
+        let tally = Tally {
+            samples: 255.9,
+            error: Some((200, 0.0123)),
+            forecast: Some(Forecast {
+                fraction: 1.0,
+                left: 0.04,
+            }),
+            ..Tally::default()
+        };
+        assert_eq!(
+            describe(&tally),
+            "255 samples, 99 %, 0.0 s left, relative error 1.23 %"
+        );
+        assert_eq!(describe(&Tally::default()), "0 samples");
+    }
+
+    #[test]
+    fn times_and_errors_read_well() {
+        for (seconds, text) in [
+            (0.04, "0.0 s"),
+            (9.4, "9.4 s"),
+            (9.6, "10 s"),
+            (119.0, "119 s"),
+            (200.0, "3 min 20 s"),
+            (7500.0, "2 h 5 min"),
+        ] {
+            assert_eq!(clock(seconds), text);
+        }
+        for (error, text) in [(0.5, "50.0 %"), (0.02, "2.00 %"), (0.0012, "0.120 %")] {
+            assert_eq!(percent(error), text);
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! `etendue render`: from a scene file to pictures, film and report.
+
+use super::args::{Backend, RenderArgs};
+use super::backend::{self, Chosen};
+use super::failure::Failure;
+use super::plan;
+use super::progress::{Progress, clock, percent};
+use super::saver::Saver;
+use super::signals::Signals;
+use super::{memory, say};
+use crate::engine::Counters;
+use crate::film::coverage::Rect;
+use crate::film::{Film, store};
+use crate::kernel;
+use crate::output::report::{self, Report, Seconds};
+use crate::output::{FileError, Format, atomic};
+use crate::provenance::Provenance;
+use crate::run::{self, Job, Run, StopReason, Tally};
+use crate::scene::{Scene, check, parse};
+use crate::settings::Settings;
+use crate::world::World;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Renders a scene.
+pub fn render(args: &RenderArgs) -> Result<(), Failure> {
+    let begun = Instant::now();
+
+    // Whatever can be refused is refused now, before the first sample.
+    let outputs = outputs(args);
+    check_outputs(args, &outputs)?;
+    if args.backend == Backend::Cpu && args.adapter.is_some() {
+        let message = "--adapter names a GPU adapter, which --backend cpu does not use";
+        return Err(Failure::Input(message.into()));
+    }
+    super::set_threads(args.talk.threads);
+    let signals =
+        Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
+
+    // The scene, and the film that may be there already.
+    let text = parse::read_text(&args.scene)?;
+    let scene = parse::parse_str(&args.scene, &text).map_err(Failure::Scene)?;
+    let mut settings = Settings::resolve(&scene, &args.overrides());
+    let old = load_film(args)?;
+    if let Some((_, provenance)) = &old
+        && args.seed.is_none()
+    {
+        settings.seed = provenance.settings.seed;
+    }
+    let regions = plan::regions(args, &settings)?;
+    let bounds = plan::bounds(&regions);
+    let new = Provenance::new(&scene, text, &settings);
+    let (mut film, provenance) = match (old, &args.film) {
+        (Some((film, held)), Some(path)) => {
+            check_same_samples(path, &held, &new)?;
+            plan::check_bounds(path, &film, bounds)?;
+            (film, held)
+        }
+        _ => {
+            memory::check(bounds.area())?;
+            (Film::new(settings.size, bounds, settings.strata), new)
+        }
+    };
+    let samples = plan::samples(args, &settings, &regions, &film.coverage)?;
+
+    // The engine, and the kernel if it is to be shown.
+    let world = World::new(&scene, settings.size);
+    let mut chosen = backend::choose(args.backend, args.adapter.as_deref(), &world, &settings)?;
+    if let Some(path) = &args.dump_wgsl {
+        let wgsl = chosen.wgsl.take();
+        let wgsl = wgsl.unwrap_or_else(|| kernel::compose(&world, &settings, None).wgsl);
+        atomic::replace(path, |f| f.write_all(wgsl.as_bytes()))?;
+    }
+    let job = Job {
+        tiles: run::tiles(&regions, chosen.tile_pixels),
+        samples,
+        round: settings.round(),
+        time: args.time,
+        error: args.error,
+    };
+    if !args.talk.quiet {
+        say_start(args, &scene, &settings, &chosen, &job, &film);
+    }
+
+    // Render.
+    let device = chosen.engine.device().clone();
+    let mut saver = Saver::new(args, &provenance, &device);
+    let mut progress = Progress::new(&args.talk);
+    let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &signals.stop);
+    let ended = run.go(|film, tally| {
+        progress.show(tally);
+        saver.meanwhile(film, tally, &progress);
+        Ok::<(), Failure>(())
+    });
+    let tally = run.tally;
+    progress.finish();
+
+    // Save what there is, whatever ended the run; pictures only of a run that did not fail.
+    let provenance = saver.provenance(&film, &tally);
+    if tally.counters.paths > 0
+        && let Some(path) = &args.film
+    {
+        store::save(path, &film, &provenance)?;
+    }
+    let reason = ended?;
+    let mut written = Vec::new();
+    if !film.coverage.is_empty() {
+        for path in outputs.iter().chain(&args.watch) {
+            let format = Format::from_path(path).map_err(Failure::Input)?;
+            format.write(path, &film, &provenance, args.exposure)?;
+            written.push(path.display().to_string());
+        }
+        written.extend(args.film.iter().map(|p| p.display().to_string()));
+    }
+    if let Some(path) = &args.report {
+        let facts = report::Run {
+            scene: args.scene.display().to_string(),
+            device: &device,
+            regions: &args.region,
+            stop_reason: stop_reason(args, reason).into(),
+            seconds: Seconds {
+                compile: chosen.compile_seconds,
+                render: tally.seconds,
+                total: begun.elapsed().as_secs_f64(),
+            },
+            counters: tally.counters,
+        };
+        write_report(path, &Report::new(facts, &film, &provenance))?;
+    }
+    if !args.talk.quiet {
+        say_end(&film, &provenance, &tally, reason, &written);
+    }
+    warn(&settings, &tally.counters);
+    match reason {
+        StopReason::Interrupted => Err(Failure::Interrupted {
+            signal: signals.number(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// The pictures to write: those named, else STEM.exr and STEM.png in the working directory.
+fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
+    if !args.output.is_empty() {
+        return args.output.clone();
+    }
+    let stem = args.scene.file_stem().unwrap_or("picture".as_ref());
+    [".exr", ".png"]
+        .map(|extension| {
+            let mut name = stem.to_owned();
+            name.push(extension);
+            name.into()
+        })
+        .to_vec()
+}
+
+/// Refuses files that could not be written in the end.
+fn check_outputs(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), Failure> {
+    for path in outputs {
+        Format::from_path(path).map_err(Failure::Input)?;
+    }
+    if let Some(path) = &args.watch
+        && Format::from_path(path) != Ok(Format::Png)
+    {
+        let path = path.display();
+        return Err(Failure::Input(format!(
+            "--watch {path}: the picture to follow is a .png"
+        )));
+    }
+    let named = [&args.watch, &args.dump_wgsl, &args.film]
+        .into_iter()
+        .flatten();
+    let report = args.report.iter().filter(|p| !is_stdout(p));
+    for path in outputs.iter().chain(named).chain(report) {
+        atomic::check_writable(path)?;
+    }
+    Ok(())
+}
+
+fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// The film to go on with, if there is one.
+fn load_film(args: &RenderArgs) -> Result<Option<(Film, Provenance)>, Failure> {
+    match &args.film {
+        Some(path) if path.exists() => Ok(Some(store::load(path)?)),
+        _ => Ok(None),
+    }
+}
+
+/// Refuses a film whose samples are not this command's, saying what differs.
+fn check_same_samples(path: &Path, held: &Provenance, new: &Provenance) -> Result<(), Failure> {
+    held.same_samples(new).map_err(|differ| {
+        let message = format!("this film is of something else; film and command line: {differ}");
+        FileError::content(path, message).into()
+    })
+}
+
+/// The start-up line: what, on what, until when.
+fn say_start(
+    args: &RenderArgs,
+    scene: &Scene,
+    settings: &Settings,
+    chosen: &Chosen,
+    job: &Job,
+    film: &Film,
+) {
+    if let Some(note) = &chosen.note {
+        say!("{note}");
+    }
+    let suspect = check::lint(scene).len();
+    if suspect > 0 {
+        say!(
+            "warning: {suspect} suspect {} in this scene; see: etendue check {}",
+            if suspect == 1 { "thing" } else { "things" },
+            args.scene.display()
+        );
+    }
+    let [width, height] = settings.size;
+    let pixels: u64 = job.tiles.iter().map(Rect::area).sum();
+    let part = if args.region.is_empty() {
+        String::new()
+    } else {
+        format!(" ({pixels} pixels of it)")
+    };
+    let device = chosen.engine.device();
+    let mut text = format!(
+        "{}: {width}x{height}{part} on {} ({}), {}",
+        args.scene.display(),
+        device.name,
+        device.driver,
+        plan::ends(args, &job.samples)
+    );
+    if let (Some(path), false) = (&args.film, film.coverage.is_empty()) {
+        let held = samples_text(film);
+        text += &format!("; {} holds {held}", path.display());
+    }
+    say!("{text}");
+}
+
+/// `120 samples a pixel`, or `119 to 120`.
+fn samples_text(film: &Film) -> String {
+    match film.coverage.samples() {
+        (a, b) if a == b => plan::count(a),
+        (a, b) => format!("{a} to {}", plan::count(b)),
+    }
+}
+
+/// The report's word for what ended the run.
+fn stop_reason(args: &RenderArgs, reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::Samples if args.samples.is_some() => "samples",
+        StopReason::Samples => "spp",
+        StopReason::Time => "time",
+        StopReason::Error => "error",
+        StopReason::Interrupted => "interrupted",
+    }
+}
+
+fn write_report(path: &Path, report: &Report) -> Result<(), Failure> {
+    let text = report.to_json();
+    if is_stdout(path) {
+        return super::write_stdout(&text);
+    }
+    atomic::replace(path, |f| f.write_all(text.as_bytes()))?;
+    Ok(())
+}
+
+/// The closing lines.
+fn say_end(
+    film: &Film,
+    provenance: &Provenance,
+    tally: &Tally,
+    reason: StopReason,
+    written: &[String],
+) {
+    let mut text = String::new();
+    if reason == StopReason::Interrupted {
+        text += "interrupted: ";
+    }
+    if film.coverage.is_empty() {
+        say!("{text}nothing rendered, nothing written");
+        return;
+    }
+    text += &samples_text(film);
+    text += &format!(" in {}", clock(tally.seconds));
+    if tally.seconds > 0.0 {
+        let speed = tally.counters.paths as f64 / tally.seconds / 1e6;
+        text += &format!(" ({speed:.3} million paths a second)");
+    }
+    if let Some(error) = provenance.relative_error {
+        text += &format!(", relative error {}", percent(error));
+    }
+    say!("{text}");
+    say!("wrote {}", written.join(", "));
+}
+
+/// What the user must know about the picture.
+fn warn(settings: &Settings, counters: &Counters) {
+    if counters.truncated > 0 && settings.max_depth_is_default {
+        let share = counters.truncated as f64 / counters.paths as f64;
+        say!(
+            "warning: {} of {} paths ({}) were cut after {} vertices, and the picture can be darker for it; \
+             --max-depth allows more",
+            counters.truncated,
+            counters.paths,
+            percent(share),
+            settings.max_depth
+        );
+    }
+    if let Some((x, y, sample)) = counters.first_nonfinite {
+        say!(
+            "warning: {} samples were not finite and are left out, the first at pixel {x}, {y}, sample {sample}; \
+             this is a bug, please report the scene",
+            counters.nonfinite
+        );
+    }
+}
