@@ -275,6 +275,18 @@ mod tests {
     }
 
     #[test]
+    fn a_ray_just_inside_by_rounding_enters_or_is_free() {
+        let solid = upright(1.0, 2.0);
+        for (origin, outward, face) in [
+            (DVec3::new(1.0 - 1e-15, 1.0, 0.0), DVec3::X, SIDE),
+            (DVec3::new(0.3, 2.0 - 1e-15, 0.0), DVec3::Y, TOP),
+        ] {
+            assert_eq!(solid.enter(&ray(origin, outward, 0)), None);
+            assert_eq!(solid.enter(&ray(origin, -outward, 0)), Some((0.0, face)));
+        }
+    }
+
+    #[test]
     fn rays_across_the_axis_miss_beyond_the_caps() {
         let solid = upright(1.0, 2.0);
         let at = |y: f64| solid.enter(&ray(DVec3::new(-5.0, y, 0.0), DVec3::X, 0));
