@@ -124,11 +124,10 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
         _ => return Err(invalid("it has only some of the error channels".into())),
     };
     let samples = match find("samples").map(|c| &c.sample_data) {
-        Some(FlatSamples::U32(counts)) => Some(counts.clone()),
+        Some(FlatSamples::U32(counts)) if counts.len() == rgb.len() => Some(counts.clone()),
         Some(_) => {
-            return Err(invalid(
-                "channel samples is not of unsigned integers".into(),
-            ));
+            let what = "channel samples is not an unsigned integer for each pixel";
+            return Err(invalid(what.into()));
         }
         None => None,
     };
@@ -230,6 +229,69 @@ mod tests {
         );
         for end in 0..good.len() {
             assert!(decode(Cursor::new(&good[..end])).is_err(), "cut at {end}");
+        }
+    }
+
+    /// A picture of one row of two pixels as another program could write it; channels by name.
+    fn foreign(channels: &[(&str, FlatSamples)]) -> exr::error::Result<Picture> {
+        use exr::prelude::{Encoding, Image, LayerAttributes, WritableImage};
+        let list = channels
+            .iter()
+            .map(|(name, samples)| AnyChannel::new(*name, samples.clone()))
+            .collect();
+        let layer = Layer::new(
+            (2, 1),
+            LayerAttributes::default(),
+            Encoding::UNCOMPRESSED,
+            AnyChannels::sort(list),
+        );
+        let mut bytes = Cursor::new(Vec::new());
+        Image::from_layer(layer).write().to_buffered(&mut bytes)?;
+        decode(Cursor::new(bytes.get_ref()))
+    }
+
+    #[test]
+    fn foreign_pictures_are_read_or_refused_by_name() {
+        let floats = |x: f32| FlatSamples::F32(vec![0.5, x]);
+        let rgb = |x: f32| vec![("R", floats(x)), ("G", floats(1.0)), ("B", floats(2.0))];
+        let plain = foreign(&rgb(0.25)).unwrap();
+        assert_eq!(plain.rgb, [[0.5; 3], [0.25, 1.0, 2.0]]);
+        assert_eq!((plain.alpha, plain.error), (vec![1.0; 2], None));
+        let half = FlatSamples::F16(vec![exr::prelude::f16::from_f32(0.5); 2]);
+        let half = [("R", half.clone()), ("G", half.clone()), ("B", half)];
+        assert_eq!(foreign(&half).unwrap().rgb, [[0.5; 3]; 2]);
+
+        let errors = |names: &[&'static str], x: f32| {
+            let mut all = rgb(1.0);
+            all.extend(names.iter().map(|n| (*n, floats(x))));
+            all
+        };
+        let all = ["error.R", "error.G", "error.B", "error.Y"];
+        assert!(foreign(&errors(&all, 0.0)).unwrap().error.is_some());
+        let integers = FlatSamples::U32(vec![1, 2]);
+        let mut counted = rgb(1.0);
+        counted.push(("samples", integers.clone()));
+        assert_eq!(foreign(&counted).unwrap().samples, Some(vec![1, 2]));
+        for (channels, expected) in [
+            (rgb(f32::NAN), "channel R is NaN at pixel (1, 0)"),
+            (rgb(f32::INFINITY), "channel R is inf at pixel (1, 0)"),
+            (
+                errors(&all, -0.5),
+                "channel error.R is -0.5 at pixel (1, 0)",
+            ),
+            (errors(&all[1..], 0.5), "only some of the error channels"),
+            (
+                errors(&["samples"], 0.5),
+                "channel samples is not an unsigned",
+            ),
+            (vec![("Y", floats(1.0))], "no channel R; it has Y"),
+            (
+                vec![("R", integers), ("G", floats(1.0)), ("B", floats(1.0))],
+                "channel R is of integers",
+            ),
+        ] {
+            let error = foreign(&channels).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
         }
     }
 
