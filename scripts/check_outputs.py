@@ -34,8 +34,8 @@ def plain(value):
     """What JSON can hold of a header's value; text for the rest."""
     if isinstance(value, (str, int, float, bool)):
         return value
-    if isinstance(value, numpy.ndarray):
-        return value.tolist()
+    if isinstance(value, numpy.ndarray):  # numbers come as arrays of one
+        return value.item() if value.size == 1 else value.tolist()
     return str(value)
 
 

@@ -280,6 +280,21 @@ fn bad_numbers_are_refused_with_their_pixel() {
         let text = refused(&path, &fs::read(&path).unwrap());
         assert!(text.contains(expected), "{text}");
     }
+    // Light where no sample is counted: a corner of the bounds that no region reaches.
+    let regions = region_film();
+    let mut sums = regions.sums().to_vec();
+    let uncovered = regions.index(5, 1);
+    assert_eq!(sums[uncovered], [[0.0; 4]; REPLICATES]);
+    sums[uncovered][0][0] = 1.0;
+    let coverage = regions.coverage.clone();
+    let dark = Film::from_parts(regions.size, regions.bounds, 2, coverage, sums, vec![]);
+    let (path, _) = saved(dir.path(), &dark);
+    let text = refused(&path, &fs::read(&path).unwrap());
+    assert!(
+        text.contains("pixel (5, 1): \"sums\" holds light"),
+        "{text}"
+    );
+
     let rect = Rect::whole(film.size);
     film.put_block(rect, 300..301, |x, _| {
         [[if x == 6 { f32::NAN } else { 1.0 }; 4]; REPLICATES]

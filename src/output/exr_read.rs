@@ -6,7 +6,7 @@ use exr::image::{AnyChannel, AnyChannels, FlatSamples, Layer};
 use exr::meta::MetaData;
 use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, Text};
 use std::collections::BTreeMap;
-use std::io::{BufReader, Read, Seek};
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// How many bytes one byte of a chunk can become: deflate's limit (RFC 1951: 258 bytes from two bits),
@@ -29,7 +29,7 @@ pub struct Picture {
     pub rgb: Vec<[f32; 3]>,
     /// 1 where the picture has samples, 0 where it has none; all 1 when the file has no such channel.
     pub alpha: Vec<f32>,
-    /// Standard errors of R, G, B and of the luminance, >= 0, if the file has all four.
+    /// Standard errors of R, G, B and of the luminance, >= 0, if the file has them.
     pub error: Option<Vec<[f32; 4]>>,
     /// Samples of each pixel, if the file has them.
     pub samples: Option<Vec<u32>>,
@@ -41,12 +41,12 @@ pub struct Picture {
 /// compressions that the exr crate knows. Values that are NaN or infinite and negative errors make
 /// the content wrong, as do damaged files; a missing or unreadable file is another error.
 pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
-    let file = open(path)?;
-    let length = file
-        .metadata()
-        .map_err(|e| FileError::io(path, "cannot read", &e))?
-        .len();
-    decode(BufReader::new(file), length).map_err(|e| match e {
+    let mut bytes = Vec::new();
+    open(path)?
+        .read_to_end(&mut bytes)
+        .map_err(|e| FileError::io(path, "cannot read", &e))?;
+    // From memory: a damaged offset then can't make the system call fail, as if access were at fault.
+    decode(Cursor::new(bytes.as_slice())).map_err(|e| match e {
         Error::Io(e) => FileError::reading(path, &e),
         Error::Invalid(what) => FileError::content(path, format!("no usable EXR: {what}")),
         Error::NotSupported(what) => FileError::content(path, format!("unsupported EXR: {what}")),
@@ -54,7 +54,8 @@ pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
     })
 }
 
-fn decode(mut from: impl Read + Seek, length: u64) -> exr::error::Result<Picture> {
+fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
+    let length = from.get_ref().len() as u64;
     let meta = MetaData::read_from_buffered(&mut from, false)?;
     for header in &meta.headers {
         let size = header.layer_size;
@@ -73,7 +74,7 @@ fn decode(mut from: impl Read + Seek, length: u64) -> exr::error::Result<Picture
             )));
         }
     }
-    from.rewind()?;
+    from.set_position(0);
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -119,14 +120,14 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
     let layers = ["error.R", "error.G", "error.B", "error.Y"].map(find);
     let error = match layers {
         [Some(r), Some(g), Some(b), Some(y)] => Some(interleave([r, g, b, y], size, 0.0)?),
-        _ => None,
+        [None, None, None, None] => None,
+        _ => return Err(invalid("it has only some of the error channels".into())),
     };
     let samples = match find("samples").map(|c| &c.sample_data) {
-        Some(FlatSamples::U32(counts)) => Some(counts.clone()),
+        Some(FlatSamples::U32(counts)) if counts.len() == rgb.len() => Some(counts.clone()),
         Some(_) => {
-            return Err(invalid(
-                "channel samples is not of unsigned integers".into(),
-            ));
+            let what = "channel samples is not an unsigned integer for each pixel";
+            return Err(invalid(what.into()));
         }
         None => None,
     };
@@ -169,6 +170,9 @@ fn interleave<const N: usize>(
         if channel.sample_data.len() != pixels {
             return Err(invalid(format!("channel {} is subsampled", channel.name)));
         }
+        if matches!(channel.sample_data, FlatSamples::U32(_)) {
+            return Err(invalid(format!("channel {} is of integers", channel.name)));
+        }
         let values = channel.sample_data.values_as_f32();
         for (i, (pixel, value)) in out.iter_mut().zip(values).enumerate() {
             if !value.is_finite() || value < least {
@@ -182,4 +186,133 @@ fn interleave<const N: usize>(
         }
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Film;
+    use crate::film::coverage::Rect;
+    use crate::output::write_exr;
+    use crate::provenance::tests::example;
+
+    /// A small picture of several chunks.
+    fn bytes() -> Vec<u8> {
+        let size = [5, 40];
+        let rect = Rect::whole(size);
+        let mut film = Film::new(size, rect, 1);
+        let pixel = |i: u32| [0, 1, 2, 3].map(|r| [1, 2, 3, 4].map(|c| f64::from(i * c + r)));
+        film.put_samples(rect, 0..8, (0..200).map(pixel).collect());
+        let path = tempfile::NamedTempFile::new().unwrap();
+        write_exr(path.path(), &film, &example(size)).unwrap();
+        std::fs::read(path.path()).unwrap()
+    }
+
+    #[test]
+    fn damage_is_survived_and_nearly_always_seen() {
+        let good = bytes();
+        let expected = decode(Cursor::new(&good)).unwrap();
+        let mut unseen = 0;
+        for bit in 0..8 * good.len() {
+            let mut bytes = good.clone();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            if let Ok(found) = decode(Cursor::new(&bytes)) {
+                let pixels = |p: &Picture| (p.rgb.clone(), p.error.clone());
+                unseen += usize::from(pixels(&found) != pixels(&expected));
+            }
+        }
+        // Pixels are protected by zlib's Adler-32, which for a few hundred bytes is weak.
+        let share = unseen as f64 / (8 * good.len()) as f64;
+        assert!(
+            share < 1e-3,
+            "{unseen} flipped bits changed the picture unseen"
+        );
+        for end in 0..good.len() {
+            assert!(decode(Cursor::new(&good[..end])).is_err(), "cut at {end}");
+        }
+    }
+
+    /// A picture of one row of two pixels as another program could write it; channels by name.
+    fn foreign(channels: &[(&str, FlatSamples)]) -> exr::error::Result<Picture> {
+        use exr::prelude::{Encoding, Image, LayerAttributes, WritableImage};
+        let list = channels
+            .iter()
+            .map(|(name, samples)| AnyChannel::new(*name, samples.clone()))
+            .collect();
+        let layer = Layer::new(
+            (2, 1),
+            LayerAttributes::default(),
+            Encoding::UNCOMPRESSED,
+            AnyChannels::sort(list),
+        );
+        let mut bytes = Cursor::new(Vec::new());
+        Image::from_layer(layer).write().to_buffered(&mut bytes)?;
+        decode(Cursor::new(bytes.get_ref()))
+    }
+
+    #[test]
+    fn foreign_pictures_are_read_or_refused_by_name() {
+        let floats = |x: f32| FlatSamples::F32(vec![0.5, x]);
+        let rgb = |x: f32| vec![("R", floats(x)), ("G", floats(1.0)), ("B", floats(2.0))];
+        let plain = foreign(&rgb(0.25)).unwrap();
+        assert_eq!(plain.rgb, [[0.5; 3], [0.25, 1.0, 2.0]]);
+        assert_eq!((plain.alpha, plain.error), (vec![1.0; 2], None));
+        let half = FlatSamples::F16(vec![exr::prelude::f16::from_f32(0.5); 2]);
+        let half = [("R", half.clone()), ("G", half.clone()), ("B", half)];
+        assert_eq!(foreign(&half).unwrap().rgb, [[0.5; 3]; 2]);
+
+        let errors = |names: &[&'static str], x: f32| {
+            let mut all = rgb(1.0);
+            all.extend(names.iter().map(|n| (*n, floats(x))));
+            all
+        };
+        let all = ["error.R", "error.G", "error.B", "error.Y"];
+        assert!(foreign(&errors(&all, 0.0)).unwrap().error.is_some());
+        let integers = FlatSamples::U32(vec![1, 2]);
+        let mut counted = rgb(1.0);
+        counted.push(("samples", integers.clone()));
+        assert_eq!(foreign(&counted).unwrap().samples, Some(vec![1, 2]));
+        for (channels, expected) in [
+            (rgb(f32::NAN), "channel R is NaN at pixel (1, 0)"),
+            (rgb(f32::INFINITY), "channel R is inf at pixel (1, 0)"),
+            (
+                errors(&all, -0.5),
+                "channel error.R is -0.5 at pixel (1, 0)",
+            ),
+            (errors(&all[1..], 0.5), "only some of the error channels"),
+            (
+                errors(&["samples"], 0.5),
+                "channel samples is not an unsigned",
+            ),
+            (vec![("Y", floats(1.0))], "no channel R; it has Y"),
+            (
+                vec![("R", integers), ("G", floats(1.0)), ("B", floats(1.0))],
+                "channel R is of integers",
+            ),
+        ] {
+            let error = foreign(&channels).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn garbled_bytes_are_survived() {
+        let good = bytes();
+        let mut state = 1u32;
+        // xorshift32
+        let mut random = move |n: usize| {
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            state as usize % n
+        };
+        for _ in 0..5000 {
+            let mut bytes = good.clone();
+            for _ in 0..1 + random(8) {
+                bytes[random(good.len())] = [0, 0xff, 0x7f, 0x80, 1][random(5)];
+            }
+            // Either answer will do, as long as it is one.
+            let _ = decode(Cursor::new(&bytes));
+        }
+    }
 }
