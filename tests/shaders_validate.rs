@@ -146,12 +146,14 @@ fn a_kernel_holds_only_what_its_scene_needs() {
     let settings = Settings::resolve(&scene, &Overrides::default());
     let wgsl = compose(&World::new(&scene, settings.size), &settings, None).wgsl;
     for absent in [
-        "cylinder",
-        "sphere_",
-        "refract",
-        "mirrored",
-        "phong",
-        "choose_light(p: vec3f, n: vec3f, u: f32, v",
+        "fn cylinder",
+        "fn sphere",
+        "fn huge",
+        "fn refract",
+        "fn mirrored",
+        "fn phong",
+        "fn light_weight",
+        "pdf: f32,\n    // Normal there",
     ] {
         assert!(!wgsl.contains(absent), "a diffuse plane needs no {absent}");
     }

@@ -44,6 +44,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
         }
     };
+    prepare_environment(&cli.command);
     let done = match cli.command {
         Command::Render(args) => render::render(&args),
         Command::Check(args) => check::check(&args),
@@ -58,6 +59,24 @@ pub fn main() -> ExitCode {
             failure.print();
             ExitCode::from(failure.status())
         }
+    }
+}
+
+/// What Vulkan drivers read from the environment; a value that the user has set stays.
+fn prepare_environment(command: &Command) {
+    let set = |name: &str, value: &str| {
+        if std::env::var_os(name).is_none() {
+            // SAFETY: the process has one thread yet, so nobody reads the environment meanwhile.
+            unsafe { std::env::set_var(name, value) };
+        }
+    };
+    // Mesa's layer for choosing among screens complains on stderr where there is no screen.
+    set("NODEVICE_SELECT", "1");
+    if let Command::Render(args) = command
+        && let Some(threads) = args.talk.threads
+    {
+        // lavapipe's own.
+        set("LP_NUM_THREADS", &threads.to_string());
     }
 }
 

@@ -14,6 +14,7 @@ pub mod store;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};
+use std::mem::take;
 use std::ops::Range;
 
 /// Independent replicates in every film.
@@ -130,6 +131,7 @@ impl Film {
             "one block at a time"
         );
         let ends = samples.end % BLOCK == 0;
+        let fresh = samples.start.is_multiple_of(BLOCK);
         if !ends && self.partial.is_empty() {
             self.partial = vec![Default::default(); self.sums.len()];
         }
@@ -137,6 +139,10 @@ impl Film {
             for x in rect.x0..rect.x1 {
                 let i = self.index(x, y);
                 let new = running(x, y);
+                if fresh && !self.partial.is_empty() {
+                    // What is there belongs to another block.
+                    fold(&mut self.sums[i], &take(&mut self.partial[i]));
+                }
                 if ends {
                     fold(&mut self.sums[i], &new);
                     if !self.partial.is_empty() {
@@ -361,6 +367,20 @@ mod tests {
         let e = estimate(&sums, &[1, 0, 0, 0]);
         assert_eq!(e.replicates, 1);
         assert!((e.error[3] - 1.0).abs() < 1e-12 && (e.error[0] - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_unfinished_block_survives_another() {
+        let rect = Rect {
+            x0: 0,
+            y0: 0,
+            x1: 1,
+            y1: 1,
+        };
+        let mut film = Film::new([1, 1], rect, 2);
+        film.put_block(rect, 0..10, |_, _| [[1.0f32; 4]; REPLICATES]);
+        film.put_block(rect, BLOCK..2 * BLOCK, |_, _| [[2.0f32; 4]; REPLICATES]);
+        assert_eq!(film.total(0, 0), [[3.0; 4]; REPLICATES]);
     }
 
     #[test]

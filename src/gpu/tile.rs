@@ -21,6 +21,12 @@ fn row_bytes(width: u32) -> u32 {
     (width * TEXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }
 
+/// llvmpipe compiles a kernel anew for textures whose width or height is a power of two, as if it sampled them:
+/// with none, the compilation at start-up serves every tile.
+fn not_a_power_of_two(n: u32) -> u32 {
+    if n.is_power_of_two() { n + 1 + u32::from(n == 1) } else { n }
+}
+
 impl Tile {
     pub fn new(
         gpu: &Gpu,
@@ -31,7 +37,7 @@ impl Tile {
         let texture = || {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("running sums"),
-                size: extent(size, REPLICATES as u32),
+                size: extent(size.map(not_a_power_of_two), REPLICATES as u32),
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,

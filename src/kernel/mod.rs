@@ -142,13 +142,14 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     }
 }
 
-/// A shader whose entry point `probe` runs `body` on 16 floats `x` into 16 floats `y`, beside all modules but the camera.
+/// A shader whose entry point `probe` runs `body` on 16 floats `x` into 16 floats `y`, beside the modules that need no
+/// scene.
 pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
     let features: BTreeSet<&str> = features.iter().copied().collect();
     let mut s = String::new();
     tags(&mut s);
     for (name, text) in MODULES {
-        if name != "camera" {
+        if name != "camera" && name != "surface" {
             s.push_str(&preprocess::run(text, &features));
         }
     }
