@@ -1,7 +1,7 @@
 // Capped cylinders as the common part of an infinite cylinder and the slab between the caps: the interval
 // of the ray inside one intersected with that inside the other, which makes the rim watertight
-// [Cychosz1994]. In the plane across the axis, A = |d|^2, B = m.d, and the discriminant is
-// A (r + |w|)(r - |w|) with w the nearest point to the axis, which keeps its precision near tangents.
+// [Cychosz1994]. In the plane across the axis, A = |d|^2, B = m.d, and the discriminant is A (r^2 - |w|^2)
+// with w the nearest point to the axis, which keeps the precision that B^2 - A C loses.
 
 // Parts of a cylinder's key.
 const CYLINDER_SIDE: u32 = 0u;
@@ -33,10 +33,10 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
     // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0.
     let along = dot(c.axis, ray.d);
     let up = along > 0.0;
-    let cos = select(min(along, -1.0e-20), max(along, 1.0e-20), up);
+    let inv_cos = 1.0 / select(min(along, -1.0e-20), max(along, 1.0e-20), up);
     let height = dot(c.axis, ray.o);
-    let at_base = select((c.offsets.x - height) / cos, 0.0, ray.face == base);
-    let at_top = select((c.offsets.y - height) / cos, 0.0, ray.face == top);
+    let at_base = select((c.offsets.x - height) * inv_cos, 0.0, ray.face == base);
+    let at_top = select((c.offsets.y - height) * inv_cos, 0.0, ray.face == top);
     let slab_enter = select(at_top, at_base, up);
     let slab_leave = select(at_base, at_top, up);
 
@@ -48,10 +48,9 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
     let b = dot(m, d);
     let parallel = a < ALONG_AXIS;
     let inv_a = 1.0 / max(a, ALONG_AXIS);
-    let w = length(m - d * (b * inv_a));
-    let distance = length(m);
-    let excess = (distance + c.radius) * (distance - c.radius);
-    let disc = a * (c.radius + w) * (c.radius - w);
+    let w = m - d * (b * inv_a);
+    let excess = dot(m, m) - c.radius * c.radius;
+    let disc = a * (c.radius * c.radius - dot(w, w));
     let root = safe_sqrt(disc);
     let q = -(b + select(-root, root, b >= 0.0));
     let first = q * inv_a;
@@ -67,7 +66,7 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
         min(slab_leave, far),
         select(CYLINDER_SIDE, select(CYLINDER_TOP, CYLINDER_BASE, up), slab_enter >= near),
         select(CYLINDER_SIDE, select(CYLINDER_BASE, CYLINDER_TOP, up), slab_leave < far),
-        select(disc >= 0.0, distance <= c.radius, parallel),
+        select(disc >= 0.0, excess <= 0.0, parallel),
     );
 }
 
@@ -91,4 +90,11 @@ fn cylinder_boundary(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top:
     let enters = ray.medium == parent && s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
     let t = max(select(s.enter, s.leave, inside), 0.0);
     return nearer(hit, inside || enters, t, key + select(s.enter_part, s.leave_part, inside));
+}
+
+// For shadow rays: whatever starts inside a solid that holds no light is in its shadow.
+fn cylinder_boundary_shadow(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32, solid: u32, parent: u32) -> Hit {
+    let outside = cylinder_outside(hit, ray, c, side, base, top, key);
+    let met = ray.medium == solid || (ray.medium == parent && outside.key != hit.key);
+    return Hit(hit.t, select(hit.key, key, met));
 }

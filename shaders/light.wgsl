@@ -33,8 +33,9 @@ fn cap_of(light: DiskLight, p: vec3f) -> Cap {
     let a2 = dot(radial, radial);
     let s = a2 + h * h - r2;
     let q = sqrt(s * s + 4.0 * h * h * r2);
-    // Either form cancels on one side of s = 0.
-    let height = select((q - s) / (2.0 * max(h, TINY)), 2.0 * h * r2 / max(q + s, TINY), s > 0.0);
+    // (q - s) / 2h = 2 h r^2 / (q + s), and either form cancels on one side of s = 0.
+    let far = s > 0.0;
+    let height = select(q - s, 2.0 * h * r2, far) / max(select(2.0 * h, q + s, far), TINY);
     return Cap(v, h, a2, s, q, select(0.0, height, h > 0.0));
 }
 

@@ -60,3 +60,10 @@ fn sphere_boundary(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u3
     let enters = ray.medium == parent && disc >= 0.0 && b > 0.0 && !on;
     return nearer(hit, inside || enters, max(select(c / q, leaving, inside), 0.0), key);
 }
+
+// For shadow rays: whatever starts inside a solid that holds no light is in its shadow.
+fn sphere_boundary_shadow(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u32, parent: u32) -> Hit {
+    let outside = sphere_shadow(hit, ray, s, face, key);
+    let met = ray.medium == solid || (ray.medium == parent && outside.key != hit.key);
+    return Hit(hit.t, select(hit.key, key, met));
+}

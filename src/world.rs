@@ -214,6 +214,26 @@ impl World {
         }
     }
 
+    /// Whether any part of a light lies inside dielectric solid `solid`: its centre, or one of 16 points of its rim.
+    pub fn holds_light(&self, solid: u32) -> bool {
+        let Some(s) = self.primitives.iter().find(|p| p.solid == solid) else {
+            return false;
+        };
+        self.lights.iter().any(|l| {
+            let x = l.normal.any_orthonormal_vector();
+            let y = l.normal.cross(x);
+            let rim = (0..16).map(|k| {
+                let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 16.0).sin_cos();
+                l.center + (x * cos + y * sin) * l.radius
+            });
+            // A light flush on the inside of the surface lies in it.
+            let mut points = std::iter::once(l.center)
+                .chain(rim)
+                .map(|p| p + l.normal * (COINCIDENT * l.radius));
+            points.any(|p| inside(&s.geometry, p))
+        })
+    }
+
     /// Index of refraction of a medium relative to air: the product of the iors of the solids around it.
     pub fn index_of(&self, medium: u32) -> f64 {
         index_of(&self.primitives, &self.materials, medium)

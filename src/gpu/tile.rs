@@ -24,7 +24,11 @@ fn row_bytes(width: u32) -> u32 {
 /// llvmpipe compiles a kernel anew for textures whose width or height is a power of two, as if it sampled them:
 /// with none, the compilation at start-up serves every tile.
 fn not_a_power_of_two(n: u32) -> u32 {
-    if n.is_power_of_two() { n + 1 + u32::from(n == 1) } else { n }
+    if n.is_power_of_two() {
+        n + 1 + u32::from(n == 1)
+    } else {
+        n
+    }
 }
 
 impl Tile {

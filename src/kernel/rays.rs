@@ -24,9 +24,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
         let hull = hull_faces(world);
         blockers.retain(|b| can_block(world, b, &hull));
         for b in &mut blockers {
-            if b.function == "sphere_outside" {
-                b.function = "sphere_shadow";
-            }
+            b.function = shadow_function(world, b);
         }
         calls(&mut s, world, &blockers, access, false);
         s.push_str("    return hit.key != NONE;\n}\n\n");
@@ -74,6 +72,17 @@ fn function(p: &WorldPrimitive) -> &'static str {
         (Geometry::HugeSphere { .. }, Side::Outside) => "huge_sphere_outside",
         (Geometry::HugeSphere { .. }, Side::Inside) => "huge_sphere_inside",
         (Geometry::HugeSphere { .. }, Side::Both) => "huge_sphere_boundary",
+    }
+}
+
+/// The function that answers for a shadow ray, which needs no distance, what `surface.function` answers for others.
+fn shadow_function(world: &World, surface: &Surface) -> &'static str {
+    let dark = || !world.holds_light(primitive(world, surface).solid);
+    match surface.function {
+        "sphere_outside" => "sphere_shadow",
+        "sphere_boundary" if dark() => "sphere_boundary_shadow",
+        "cylinder_boundary" if dark() => "cylinder_boundary_shadow",
+        other => other,
     }
 }
 
@@ -223,7 +232,10 @@ fn disk(center: DVec3, radius: f64, normal: DVec3, offset: f64) -> String {
 fn buffer_call(function: &str) -> String {
     let (shape, faces) = match function {
         "disk_hit" => ("Disk(s.point, s.radius, s.axis, s.offset)", "s.faces.x, "),
-        "cylinder_outside" | "cylinder_inside" | "cylinder_boundary" => (
+        "cylinder_outside"
+        | "cylinder_inside"
+        | "cylinder_boundary"
+        | "cylinder_boundary_shadow" => (
             "Cylinder(s.point, s.radius, s.axis, vec2f(s.offset, s.top))",
             "s.faces.x, s.faces.y, s.faces.z, ",
         ),
@@ -234,7 +246,7 @@ fn buffer_call(function: &str) -> String {
         }
         _ => ("HugeSphere(s.point, s.offset, s.axis)", "s.faces.x, "),
     };
-    let solid = if function.ends_with("_boundary") {
+    let solid = if function.contains("_boundary") {
         ", s.solid, s.parent"
     } else {
         ""
@@ -346,37 +358,58 @@ fn light_choice(world: &World, access: Access) -> String {
         s.push_str("    return Chosen(light, cap_of(light, p), 1.0, 1.0);\n}\n");
         return s;
     }
-    // One pass over the lights: each replaces the choice with its share of the sum so far, and the
-    // random number is stretched to be used again.
-    s.push_str("    var index = 0u;\n    var chosen = 0.0;\n    var sum = 0.0;\n    var v = u;\n");
-    let step = "\
+    match access {
+        Access::Baked => {
+            // All weights stay in registers; the first partial sum above u times the whole chooses.
+            for (i, l) in world.lights.iter().enumerate() {
+                let _ = writeln!(s, "    let light_{i} = {};", light_literal(l));
+                let _ = writeln!(
+                    s,
+                    "    let w_{i} = light_weight(light_{i}, cap_of(light_{i}, p), n);"
+                );
+                let before = if i == 0 {
+                    String::new()
+                } else {
+                    format!("sum_{} + ", i - 1)
+                };
+                let _ = writeln!(s, "    let sum_{i} = {before}w_{i};");
+            }
+            let last = world.lights.len() - 1;
+            let _ = writeln!(
+                s,
+                "    let sum = sum_{last};\n    let at = u * sum;\n    var index = 0u;\n    var chosen = w_0;"
+            );
+            for i in 1..=last {
+                let _ = writeln!(s, "    index = select(index, {i}u, at >= sum_{});", i - 1);
+                let _ = writeln!(
+                    s,
+                    "    chosen = select(chosen, w_{i}, at >= sum_{});",
+                    i - 1
+                );
+            }
+        }
+        Access::Buffers => {
+            // One pass: each light replaces the choice with its share of the sum so far, and the random number is
+            // stretched to be used again.
+            let _ = write!(
+                s,
+                "    var index = 0u;
+    var chosen = 0.0;
+    var sum = 0.0;
+    var v = u;
+    for (var i = 0u; i < {}u; i++) {{
+        let light = lights[i];
         let w = light_weight(light, cap_of(light, p), n);
         sum += w;
         let share = w / max(sum, TINY);
         let take = v < share;
         v = select((v - share) / max(1.0 - share, TINY), v / max(share, TINY), take);
-";
-    match access {
-        Access::Baked => {
-            for (i, l) in world.lights.iter().enumerate() {
-                let _ = write!(
-                    s,
-                    "    {{\n        let light = {};\n{step}",
-                    light_literal(l)
-                );
-                let _ = writeln!(
-                    s,
-                    "        index = select(index, {i}u, take);\n        chosen = select(chosen, w, take);\n    }}"
-                );
-            }
-        }
-        Access::Buffers => {
-            let _ = write!(
-                s,
-                "    for (var i = 0u; i < {}u; i++) {{\n        let light = lights[i];\n{step}",
+        index = select(index, i, take);
+        chosen = select(chosen, w, take);
+    }}
+",
                 world.lights.len()
             );
-            s.push_str("        index = select(index, i, take);\n        chosen = select(chosen, w, take);\n    }\n");
         }
     }
     s.push_str("    let light = light_at(index);\n");
