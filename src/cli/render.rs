@@ -212,11 +212,9 @@ fn say_start(
     }
     let suspect = check::lint(scene).len();
     if suspect > 0 {
-        say!(
-            "warning: {suspect} suspect {} in this scene; see: etendue check {}",
-            if suspect == 1 { "thing" } else { "things" },
-            args.scene.display()
-        );
+        let s = if suspect == 1 { "" } else { "s" };
+        let scene = args.scene.display();
+        say!("note: {suspect} warning{s} about this scene; see: etendue check {scene}");
     }
     let [width, height] = settings.size;
     let pixels: u64 = job.tiles.iter().map(Rect::area).sum();
