@@ -194,7 +194,8 @@ fn time_ends_a_run_but_leaves_no_holes() {
     let begun = Instant::now();
     assert_eq!(run(&job, &mut engine, &mut film), StopReason::Time);
     assert!(begun.elapsed() < Duration::from_secs(2));
-    assert_eq!(film.coverage.samples().0, 1);
+    let pixels: u64 = film.coverage.cells().map(|(r, _)| r.area()).sum();
+    assert_eq!((pixels, film.coverage.samples().0), (64, 1));
 }
 
 #[test]
