@@ -124,7 +124,7 @@ pub struct RenderArgs {
     /// Rays for every stratum of a pixel: strata² x N samples a pixel
     #[arg(long, value_name = "N", value_parser = values::samples, help_heading = "When to stop")]
     pub rays: Option<u64>,
-    /// Stop after this long rendering: 90s, 2m, 1h30m
+    /// Stop after this long rendering (90s, 2m, 1h30m), but not before every pixel has a sample
     #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "When to stop")]
     pub time: Option<Duration>,
     /// Stop when the estimated relative error is at most this: 0.02 or 2%

@@ -74,7 +74,11 @@ impl Progress {
 
 /// One line: samples, per cent, error so far, time left. Never says 100 %.
 fn describe(tally: &Tally) -> String {
-    let mut text = format!("{:.0} samples", tally.samples.floor());
+    let mut text = if tally.samples < 10.0 {
+        format!("{:.1} samples", (tally.samples * 10.0).floor() / 10.0)
+    } else {
+        format!("{:.0} samples", tally.samples.floor())
+    };
     if let Some(f) = tally.forecast {
         text += &format!(", {:.0} %", (f.fraction * 100.0).floor().min(99.0));
         text += &format!(", {} left", clock(f.left));
@@ -86,15 +90,12 @@ fn describe(tally: &Tally) -> String {
 }
 
 /// Three digits and a per cent sign.
-pub fn percent(error: f64) -> String {
-    let p = error * 100.0;
-    let digits = if p >= 10.0 {
-        1
-    } else if p >= 1.0 {
-        2
-    } else {
-        3
-    };
+pub fn percent(share: f64) -> String {
+    let p = share * 100.0;
+    if p == 0.0 {
+        return "0 %".to_owned();
+    }
+    let digits = (2.0 - p.abs().log10().floor()).clamp(1.0, 12.0) as usize;
     format!("{p:.digits$} %")
 }
 
@@ -129,7 +130,7 @@ mod tests {
             describe(&tally),
             "255 samples, 99 %, 0.0 s left, relative error 1.23 %"
         );
-        assert_eq!(describe(&Tally::default()), "0 samples");
+        assert_eq!(describe(&Tally::default()), "0.0 samples");
     }
 
     #[test]
@@ -144,7 +145,13 @@ mod tests {
         ] {
             assert_eq!(clock(seconds), text);
         }
-        for (error, text) in [(0.5, "50.0 %"), (0.02, "2.00 %"), (0.0012, "0.120 %")] {
+        for (error, text) in [
+            (0.0, "0 %"),
+            (0.5, "50.0 %"),
+            (0.02, "2.00 %"),
+            (0.0012, "0.120 %"),
+            (3.81e-6, "0.000381 %"),
+        ] {
             assert_eq!(percent(error), text);
         }
     }

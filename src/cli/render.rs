@@ -98,20 +98,18 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
     // Save what there is, whatever ended the run; pictures only of a run that did not fail.
     let provenance = saver.provenance(&film, &tally);
-    if tally.counters.paths > 0
-        && let Some(path) = &args.film
-    {
+    let mut written = Vec::new();
+    if let Some(path) = args.film.as_ref().filter(|_| tally.counters.paths > 0) {
         store::save(path, &film, &provenance)?;
+        written.push(path.display().to_string());
     }
     let reason = ended?;
-    let mut written = Vec::new();
     if !film.coverage.is_empty() {
         for path in outputs.iter().chain(&args.watch) {
             let format = Format::from_path(path).map_err(Failure::Input)?;
             format.write(path, &film, &provenance, args.exposure)?;
             written.push(path.display().to_string());
         }
-        written.extend(args.film.iter().map(|p| p.display().to_string()));
     }
     if let Some(path) = &args.report {
         let facts = report::Run {
@@ -212,11 +210,9 @@ fn say_start(
     }
     let suspect = check::lint(scene).len();
     if suspect > 0 {
-        say!(
-            "warning: {suspect} suspect {} in this scene; see: etendue check {}",
-            if suspect == 1 { "thing" } else { "things" },
-            args.scene.display()
-        );
+        let s = if suspect == 1 { "" } else { "s" };
+        let scene = args.scene.display();
+        say!("note: {suspect} warning{s} about this scene; see: etendue check {scene}");
     }
     let [width, height] = settings.size;
     let pixels: u64 = job.tiles.iter().map(Rect::area).sum();

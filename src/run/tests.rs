@@ -1,0 +1,229 @@
+//! Runs with an engine that makes hashes instead of light.
+
+use super::*;
+use crate::engine::DeviceInfo;
+use crate::film::Sums;
+
+/// An engine whose pixels are noise that depends on pixel and sample number alone; notes its calls.
+struct Fake {
+    device: DeviceInfo,
+    calls: Vec<(Rect, Range<u64>)>,
+    nap: Duration,
+    fail_at: Option<usize>,
+}
+
+impl Fake {
+    fn new() -> Self {
+        Self {
+            device: DeviceInfo {
+                name: "fake".into(),
+                driver: String::new(),
+                backend: "cpu".into(),
+                software: true,
+            },
+            calls: Vec::new(),
+            nap: Duration::ZERO,
+            fail_at: None,
+        }
+    }
+}
+
+/// A value in 0..1 from a pixel and a sample.
+fn noise(x: u32, y: u32, s: u64) -> f64 {
+    let h = (u64::from(x) << 40 ^ u64::from(y) << 20 ^ s).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    ((h ^ (h >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f64 / (1u64 << 24) as f64
+}
+
+impl Engine for Fake {
+    fn render(
+        &mut self,
+        film: &mut Film,
+        rect: Rect,
+        samples: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError> {
+        assert!(rect.area() <= MAX_TILE_PIXELS);
+        assert!(film.coverage.overlap(rect, &samples).is_none());
+        if stop.load(Ordering::Relaxed) {
+            return Err(EngineError::Stopped);
+        }
+        if self.fail_at == Some(self.calls.len()) {
+            return Err(EngineError::Device("lost".into()));
+        }
+        std::thread::sleep(self.nap);
+        let round = u64::from(film.strata * film.strata);
+        film.put_block(rect, samples.clone(), |_, _| [[0.0; 4]; REPLICATES]);
+        let pixels = (rect.y0..rect.y1)
+            .flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let mut sums: [Sums<f64>; REPLICATES] = film.sums()[film.index(x, y)];
+                for s in samples.clone() {
+                    let v = noise(x, y, s);
+                    let r = &mut sums[(s / round) as usize % REPLICATES];
+                    *r = [r[0] + v, r[1] + v, r[2] + v, r[3] + v * v];
+                }
+                sums
+            });
+        let (pixels, coverage) = (pixels.collect::<Vec<_>>(), film.coverage.clone());
+        film.coverage = Coverage::default();
+        film.put_samples(rect, samples.clone(), pixels);
+        film.coverage = coverage;
+        self.calls.push((rect, samples.clone()));
+        Ok(Counters {
+            paths: rect.area() * (samples.end - samples.start),
+            ..Counters::default()
+        })
+    }
+
+    fn device(&self) -> &DeviceInfo {
+        &self.device
+    }
+}
+
+fn job(size: [u32; 2], limit: u64, samples: Range<u64>) -> Job {
+    Job {
+        tiles: tiles(&[Rect::whole(size)], limit),
+        samples,
+        round: 4,
+        time: None,
+        error: None,
+    }
+}
+
+fn run(job: &Job, engine: &mut Fake, film: &mut Film) -> StopReason {
+    let stop = AtomicBool::new(false);
+    let mut run = Run::new(job, engine, film, &stop);
+    run.go(|_, _| Ok::<(), EngineError>(())).unwrap()
+}
+
+#[test]
+fn tiles_hold_each_pixel_once_within_the_limit() {
+    let r = |x0, y0, x1, y1| Rect { x0, y0, x1, y1 };
+    let regions = [r(0, 0, 50, 40), r(30, 20, 90, 70), r(95, 0, 96, 70)];
+    let cut = tiles(&regions, 1000);
+    for y in 0..80 {
+        for x in 0..100 {
+            let wanted = regions.iter().any(|r| r.contains(x, y));
+            let found = cut.iter().filter(|t| t.contains(x, y)).count();
+            assert_eq!(found, usize::from(wanted), "pixel {x}, {y}");
+        }
+    }
+    assert!(cut.iter().all(|t| t.area() <= 1000));
+    // A row longer than the limit is a tile of its own.
+    assert_eq!(tiles(&[r(0, 0, 65536, 2)], 1000).len(), 2);
+    assert_eq!(tiles(&[Rect::whole([65536, 65536])], u64::MAX).len(), 4096);
+}
+
+#[test]
+fn passes_cover_the_job_grow_and_stay_in_their_block() {
+    let job = job([7, 5], 14, 0..700);
+    let mut film = Film::new([7, 5], Rect::whole([7, 5]), 2);
+    let mut engine = Fake::new();
+    assert_eq!(run(&job, &mut engine, &mut film), StopReason::Samples);
+    assert_eq!(film.coverage.samples(), (700, 700));
+    assert_eq!(engine.calls[0].1, 0..1);
+    for (_, s) in &engine.calls {
+        assert_eq!(s.start / BLOCK, (s.end - 1) / BLOCK, "{s:?}");
+    }
+    assert!(engine.calls.iter().any(|(_, s)| s.end - s.start >= 64));
+}
+
+#[test]
+fn resuming_does_only_what_is_missing() {
+    let size = [7, 5];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    run(&job(size, 14, 40..50), &mut Fake::new(), &mut film);
+    let mut engine = Fake::new();
+    run(&job(size, 21, 0..100), &mut engine, &mut film);
+    let paths: u64 = engine
+        .calls
+        .iter()
+        .map(|(r, s)| r.area() * (s.end - s.start))
+        .sum();
+    assert_eq!(paths, 35 * 90);
+    assert_eq!(film.coverage.samples(), (100, 100));
+    let mut again = Fake::new();
+    assert_eq!(
+        run(&job(size, 14, 0..100), &mut again, &mut film),
+        StopReason::Samples
+    );
+    assert!(again.calls.is_empty());
+}
+
+#[test]
+fn the_error_ends_a_run_at_the_same_sample_however_slow_the_machine() {
+    let size = [16, 16];
+    let mut ends = Vec::new();
+    for nap in [0, 30] {
+        let mut film = Film::new(size, Rect::whole(size), 2);
+        let mut job = job(size, 128, 0..4096);
+        job.error = Some(0.06);
+        let mut engine = Fake::new();
+        engine.nap = Duration::from_millis(nap);
+        assert_eq!(run(&job, &mut engine, &mut film), StopReason::Error);
+        assert!(film.relative_error().unwrap() <= 0.06);
+        let (least, most) = film.coverage.samples();
+        assert_eq!(least, most);
+        assert!(least > 16 && least < 400, "{least}");
+        ends.push(least);
+    }
+    assert_eq!(ends[0], ends[1]);
+}
+
+#[test]
+fn checks_are_whole_rounds_of_all_replicates() {
+    let mut count = 0;
+    let mut seen = Vec::new();
+    for _ in 0..6 {
+        count = next_check(count, 4);
+        seen.push(count);
+    }
+    assert_eq!(seen, [16, 32, 48, 64, 80, 112]);
+    assert_eq!(next_check(0, 1), 16);
+    assert_eq!(next_check(0, 9), 36);
+}
+
+#[test]
+fn time_ends_a_run_but_leaves_no_holes() {
+    let size = [8, 8];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let mut job = job(size, 16, 0..1_000_000);
+    job.time = Some(Duration::from_millis(60));
+    let mut engine = Fake::new();
+    engine.nap = Duration::from_millis(40);
+    let begun = Instant::now();
+    assert_eq!(run(&job, &mut engine, &mut film), StopReason::Time);
+    assert!(begun.elapsed() < Duration::from_secs(2));
+    let pixels: u64 = film.coverage.cells().map(|(r, _)| r.area()).sum();
+    assert_eq!((pixels, film.coverage.samples().0), (64, 1));
+}
+
+#[test]
+fn a_failing_device_leaves_what_was_done() {
+    let size = [8, 8];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let job = job(size, 64, 0..64);
+    let mut engine = Fake::new();
+    engine.fail_at = Some(3);
+    let stop = AtomicBool::new(false);
+    let mut run = Run::new(&job, &mut engine, &mut film, &stop);
+    let e = run.go(|_, _| Ok::<(), EngineError>(())).unwrap_err();
+    assert_eq!(e, EngineError::Device("lost".into()));
+    assert!(film.coverage.samples().0 > 0);
+}
+
+#[test]
+fn a_stop_flag_is_heeded_between_calls() {
+    let size = [8, 8];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let job = job(size, 64, 0..1_000_000);
+    let mut engine = Fake::new();
+    let stop = AtomicBool::new(false);
+    let mut run = Run::new(&job, &mut engine, &mut film, &stop);
+    let reason = run.go(|_, tally| {
+        stop.store(tally.samples >= 100.0, Ordering::Relaxed);
+        Ok::<(), EngineError>(())
+    });
+    assert_eq!(reason.unwrap(), StopReason::Interrupted);
+    assert!(film.coverage.samples().0 >= 100);
+}
