@@ -130,7 +130,7 @@ impl Film {
             samples.start < samples.end && samples.start / BLOCK == (samples.end - 1) / BLOCK,
             "one block at a time"
         );
-        let ends = samples.end % BLOCK == 0;
+        let ends = samples.end.is_multiple_of(BLOCK);
         let fresh = samples.start.is_multiple_of(BLOCK);
         if !ends && self.partial.is_empty() {
             self.partial = vec![Default::default(); self.sums.len()];
@@ -227,7 +227,7 @@ impl Film {
         }
         let mut ratio = 0.0;
         self.for_each(|_, _, e| {
-            ratio += e.error[3].powi(2) / (luminance(e.mean).powi(2) + floor * floor)
+            ratio += e.error[3].powi(2) / (luminance(e.mean).powi(2) + floor * floor);
         });
         Some((ratio / n as f64).sqrt())
     }

@@ -151,13 +151,11 @@ impl GpuEngine {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        for error in [
+        let errors = [
             pollster::block_on(oom.pop()),
             pollster::block_on(scope.pop()),
-        ]
-        .into_iter()
-        .flatten()
-        {
+        ];
+        if let Some(error) = errors.into_iter().flatten().next() {
             return Err(unable(format!("the kernel was refused: {error}")));
         }
         let mut engine = Self {
@@ -304,7 +302,7 @@ impl GpuEngine {
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
         let mut place = [None; REPLICATES];
-        if samples.start % BLOCK != 0 {
+        if !samples.start.is_multiple_of(BLOCK) {
             let pixels = (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
             let running: Vec<_> = pixels.map(|(x, y)| film.partial_at(x, y)).collect();
             tile.upload(&self.gpu, &running);

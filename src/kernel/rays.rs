@@ -230,21 +230,26 @@ fn disk(center: DVec3, radius: f64, normal: DVec3, offset: f64) -> String {
 }
 
 fn buffer_call(function: &str) -> String {
-    let (shape, faces) = match function {
-        "disk_hit" => ("Disk(s.point, s.radius, s.axis, s.offset)", "s.faces.x, "),
-        "cylinder_outside"
-        | "cylinder_inside"
-        | "cylinder_boundary"
-        | "cylinder_boundary_shadow" => (
+    let (shape, faces) = if function.starts_with("disk") {
+        ("Disk(s.point, s.radius, s.axis, s.offset)", "s.faces.x, ")
+    } else if function.starts_with("cylinder") {
+        (
             "Cylinder(s.point, s.radius, s.axis, vec2f(s.offset, s.top))",
             "s.faces.x, s.faces.y, s.faces.z, ",
-        ),
-        "plane_front" => ("Plane(s.axis, s.offset)", "s.faces.x, "),
-        "plane_boundary" => ("Plane(s.axis, s.offset)", ""),
-        "sphere_outside" | "sphere_shadow" | "sphere_inside" | "sphere_boundary" => {
-            ("Sphere(s.point, s.radius)", "s.faces.x, ")
-        }
-        _ => ("HugeSphere(s.point, s.offset, s.axis)", "s.faces.x, "),
+        )
+    } else if function.starts_with("plane") {
+        (
+            "Plane(s.axis, s.offset)",
+            if function == "plane_boundary" {
+                ""
+            } else {
+                "s.faces.x, "
+            },
+        )
+    } else if function.starts_with("huge") {
+        ("HugeSphere(s.point, s.offset, s.axis)", "s.faces.x, ")
+    } else {
+        ("Sphere(s.point, s.radius)", "s.faces.x, ")
     };
     let solid = if function.contains("_boundary") {
         ", s.solid, s.parent"

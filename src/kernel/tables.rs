@@ -95,7 +95,7 @@ fn material_fields(bsdf: &Bsdf) -> Fields {
     let color = ["color.x", "color.y", "color.z"];
     match *bsdf {
         Bsdf::Diffuse { reflectance } | Bsdf::Mirror { reflectance } => {
-            vector(&mut f, color, reflectance)
+            vector(&mut f, color, reflectance);
         }
         Bsdf::Dielectric { ior, transmittance } => {
             vector(&mut f, color, transmittance);

@@ -102,10 +102,9 @@ pub fn block_means(film: &Film, block: u32) -> Vec<[f64; 3]> {
     let mut sums = vec![[0.0; 4]; (bw * bh) as usize + 1];
     film.for_each(|x, y, e| {
         for k in [(y / block * bw + x / block) as usize, (bw * bh) as usize] {
-            for c in 0..3 {
-                sums[k][c] += e.mean[c];
+            for (s, x) in sums[k].iter_mut().zip(e.mean.into_iter().chain([1.0])) {
+                *s += x;
             }
-            sums[k][3] += 1.0;
         }
     });
     sums.iter()
