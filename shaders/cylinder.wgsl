@@ -25,18 +25,22 @@ struct Span {
     leave: f32,
     enter_part: u32,
     leave_part: u32,
+    // Whether the face that a shadow ray aims at is where it enters, or leaves: a light flush on a cap.
+    enter_target: bool,
+    leave_target: bool,
     // The ray meets the infinite cylinder at all.
     crosses: bool,
 }
 
 fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span {
-    // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0.
+    // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0. The quotient
+    // is that of planes and disks, so that what coincides is met at the same distance to the bit.
     let along = dot(c.axis, ray.d);
     let up = along > 0.0;
-    let inv_cos = 1.0 / select(min(along, -1.0e-20), max(along, 1.0e-20), up);
+    let cos = select(min(along, -1.0e-20), max(along, 1.0e-20), up);
     let height = dot(c.axis, ray.o);
-    let at_base = select((c.offsets.x - height) * inv_cos, 0.0, ray.face == base);
-    let at_top = select((c.offsets.y - height) * inv_cos, 0.0, ray.face == top);
+    let at_base = select((c.offsets.x - height) / cos, 0.0, ray.face == base);
+    let at_top = select((c.offsets.y - height) / cos, 0.0, ray.face == top);
     let slab_enter = select(at_top, at_base, up);
     let slab_leave = select(at_base, at_top, up);
 
@@ -61,11 +65,15 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
     let near = select(select(min(first, second), min(other, 0.0), on_side), -FAR, parallel);
     let far = select(select(max(first, second), max(other, 0.0), on_side), FAR, parallel);
 
+    let by_cap = slab_enter >= near;
+    let to_cap = slab_leave < far;
     return Span(
         max(slab_enter, near),
         min(slab_leave, far),
-        select(CYLINDER_SIDE, select(CYLINDER_TOP, CYLINDER_BASE, up), slab_enter >= near),
-        select(CYLINDER_SIDE, select(CYLINDER_BASE, CYLINDER_TOP, up), slab_leave < far),
+        select(CYLINDER_SIDE, select(CYLINDER_TOP, CYLINDER_BASE, up), by_cap),
+        select(CYLINDER_SIDE, select(CYLINDER_BASE, CYLINDER_TOP, up), to_cap),
+        by_cap && ray.target_face == select(top, base, up),
+        to_cap && ray.target_face == select(base, top, up),
         select(disc >= 0.0, excess <= 0.0, parallel),
     );
 }
@@ -73,14 +81,14 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
 // For a ray known to be outside.
 fn cylinder_outside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
-    let met = s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
+    let met = s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side && !s.enter_target;
     return nearer(hit, met, max(s.enter, 0.0), key + s.enter_part);
 }
 
 // For a ray known to be inside.
 fn cylinder_inside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
-    return nearer(hit, true, max(s.leave, 0.0), key + s.leave_part);
+    return nearer(hit, !s.leave_target, max(s.leave, 0.0), key + s.leave_part);
 }
 
 // The boundary of dielectric solid `solid` inside `parent`.
@@ -89,7 +97,8 @@ fn cylinder_boundary(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top:
     let inside = ray.medium == solid;
     let enters = ray.medium == parent && s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
     let t = max(select(s.enter, s.leave, inside), 0.0);
-    return nearer(hit, inside || enters, t, key + select(s.enter_part, s.leave_part, inside));
+    let met = (inside && !s.leave_target) || (enters && !s.enter_target);
+    return nearer(hit, met, t, key + select(s.enter_part, s.leave_part, inside));
 }
 
 // For shadow rays: whatever starts inside a solid that holds no light is in its shadow.

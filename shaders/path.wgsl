@@ -125,7 +125,9 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             // WGSL may assume that there is no NaN: look at the bits.
             let finite = (bitcast<u32>(y) & 0x7fffffffu) < 0x7f800000u;
             if finite {
-                sum += vec4f(l, y * y);
+                // The square serves the error of a single replicate alone; it must not overflow.
+                let bounded = min(y, 1.0e15);
+                sum += vec4f(l, bounded * bounded);
             } else {
                 count.w = select(count.w, s + 1u, count.z == 0u);
                 count.z += 1u;
@@ -150,7 +152,7 @@ fn emission(path: Path, hit: Hit) -> vec3f {
         let cap = cap_of(light, path.ray.o);
         var pdf = cap_pdf(light, cap, path.ray.d);
 #if SEVERAL_LIGHTS
-        pdf *= light_weight(light, cap, path.n) / path.weights;
+        pdf *= light_weight(light, cap, path.n) / max(path.weights, TINY);
 #endif
         share *= select(0.0, power_heuristic(path.pdf, SHADOW_RAYS * pdf), path.pdf > 0.0);
     }
@@ -169,10 +171,21 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     let v = vertex_at((*path).ray, hit, surface);
     let face = face_at(hit.key, surface);
     // Two-sided: the normal on the side that the ray comes from.
-    let outside = dot(v.n, d) < 0.0;
+    var outside = dot(v.n, d) < 0.0;
+#if DIELECTRIC
+    if material.kind == MATERIAL_DIELECTRIC {
+        // Known, where a grazing cosine may round to either sign.
+        outside = (*path).ray.medium != surface.solid;
+    }
+#endif
     let n = select(-v.n, v.n, outside);
     let cos_i = abs(dot(v.n, d));
 
+#if WHITTED
+    if (*path).ending {
+        return false;
+    }
+#endif
     // The vertex on the light counts too, so nothing can be gathered beyond the last one.
     if (*path).depth >= LAST_DEPTH {
 #if COUNT_TRUNCATED
@@ -180,11 +193,6 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
         return false;
     }
-#if WHITTED
-    if (*path).ending {
-        return false;
-    }
-#endif
     let u = draw(draw_key);
 
 #if LIGHT_SAMPLING
@@ -225,7 +233,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
                 (*count).x += 1u;
                 let shadow = Ray(v.p, to.d, face, (*path).ray.medium, chosen.light.face);
-                if !occluded(shadow, to.distance) {
+                if !occluded(shadow, to.distance, chosen.index) {
                     gathered += f_cos * chosen.light.radiance * (1.0 / (pdf * SHADOW_RAYS));
                 }
             }

@@ -25,10 +25,10 @@ fn plane_pair(hit: Hit, ray: Ray, low: Plane, high: f32, low_key: u32, high_key:
 }
 
 // The boundary of a dielectric half-space, which lies behind the normal.
-fn plane_boundary(hit: Hit, ray: Ray, p: Plane, key: u32, solid: u32, parent: u32) -> Hit {
+fn plane_boundary(hit: Hit, ray: Ray, p: Plane, face: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let cos = dot(p.normal, ray.d);
     let t = (p.offset - dot(p.normal, ray.o)) / cos;
     let leaves = ray.medium == solid && cos > 0.0;
     let enters = ray.medium == parent && cos < 0.0;
-    return nearer(hit, leaves || enters, max(t, 0.0), key);
+    return nearer(hit, (leaves || enters) && ray.target_face != face, max(t, 0.0), key);
 }

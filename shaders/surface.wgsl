@@ -71,7 +71,10 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
 #if ROUND
     // Radially: from the centre of a sphere, from the axis of a cylinder.
     let along = s.axis * dot(s.axis, m);
-    let n = normalize(m - along);
+    let across = m - along;
+    let distance = length(across);
+    // A surface smaller than the rounding of its place may be met at its very centre.
+    let n = select(across / max(distance, TINY), -ray.d, distance == 0.0);
     let round = Vertex(s.point + along + s.radius * n, n);
 #if FLAT
     if s.shape >= SHAPE_CYLINDER && part == 0u {

@@ -61,10 +61,7 @@ impl GpuEngine {
             adapter: gpu.info.name.clone(),
             problem,
         };
-        let mut kernel = compose(world, settings, access);
-        if let Ok(p) = std::env::var("DEV_WGSL") {
-            kernel.wgsl = std::fs::read_to_string(p).unwrap();
-        }
+        let kernel = compose(world, settings, access);
         if kernel.trips_per_sample > gpu.trip_limit {
             return Err(unable(format!(
                 "one path of this scene may take {} loop trips (max_depth {}), and this driver silently stops an \

@@ -132,8 +132,13 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
         0
     };
     let strata_loop = 32;
+    let hidden = if rays::lights_overlap(world) {
+        u64::from(settings.shadow_rays) * world.lights.len() as u64
+    } else {
+        0
+    };
     let trips_per_sample = u64::from(last_depth(settings))
-        .saturating_mul(1 + inner + shadow_loop)
+        .saturating_mul(1 + inner + shadow_loop + hidden)
         .saturating_add(strata_loop);
     Kernel {
         wgsl,

@@ -18,7 +18,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
     s.push_str("    return hit;\n}\n");
     if features.contains("LIGHT_SAMPLING") {
         s.push_str("\n// Whether anything lies within `distance` of the ray's origin. What cannot come between two points\n");
-        s.push_str("// of the room, as its own walls, is not asked.\nfn occluded(ray: Ray, distance: f32) -> bool {\n");
+        s.push_str("// of the room, as its own walls, is not asked.\nfn occluded(ray: Ray, distance: f32, light: u32) -> bool {\n");
         s.push_str("    var hit = Hit(distance, NONE);\n");
         let mut blockers = everything;
         let hull = hull_faces(world);
@@ -27,6 +27,9 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
             b.function = shadow_function(world, b);
         }
         calls(&mut s, world, &blockers, access, false);
+        if lights_overlap(world) {
+            s.push_str(HIDDEN);
+        }
         s.push_str("    return hit.key != NONE;\n}\n\n");
         s.push_str(&light_choice(world, access));
     }
@@ -207,8 +210,6 @@ fn baked_call(world: &World, s: &Surface) -> String {
     };
     let faces = match p.geometry {
         Geometry::Cylinder { .. } => format!("{}u, {}u, {}u, ", f[0], f[1], f[2]),
-        // No path stands behind its own plane, so its face does not matter.
-        Geometry::Plane { .. } if p.side == Side::Both => String::new(),
         _ => format!("{}u, ", f[0]),
     };
     let solid = if p.side == Side::Both && !matches!(p.geometry, Geometry::Disk { .. }) {
@@ -238,14 +239,7 @@ fn buffer_call(function: &str) -> String {
             "s.faces.x, s.faces.y, s.faces.z, ",
         )
     } else if function.starts_with("plane") {
-        (
-            "Plane(s.axis, s.offset)",
-            if function == "plane_boundary" {
-                ""
-            } else {
-                "s.faces.x, "
-            },
-        )
+        ("Plane(s.axis, s.offset)", "s.faces.x, ")
     } else if function.starts_with("huge") {
         ("HugeSphere(s.point, s.offset, s.axis)", "s.faces.x, ")
     } else {
@@ -343,9 +337,35 @@ pub(super) fn light_literal(l: &WorldLight) -> String {
     )
 }
 
+/// Whether two lights share a plane and some of it, where the first in the file hides the others.
+pub(super) fn lights_overlap(world: &World) -> bool {
+    let mut by_face: Vec<&WorldLight> = world.lights.iter().collect();
+    by_face.sort_by_key(|l| l.face);
+    by_face.chunk_by(|a, b| a.face == b.face).any(|plane| {
+        plane.iter().enumerate().any(|(i, a)| {
+            plane[..i]
+                .iter()
+                .any(|b| a.center.distance(b.center) < a.radius + b.radius)
+        })
+    })
+}
+
+const HIDDEN: &str = "\
+    // Lights that lie in one plane hide those that come after them.
+    let on_light = ray.o + distance * ray.d;
+    for (var i = 0u; i < light; i++) {
+        let before = lights[i];
+        let v = on_light - before.center;
+        if before.face == ray.target_face && dot(v, v) <= before.radius * before.radius {
+            hit.key = 4u * i;
+        }
+    }
+";
+
 const CHOSEN: &str = "\
 struct Chosen {
     light: DiskLight,
+    index: u32,
     cap: Cap,
     // Of this light among all, and the sum of all weights.
     probability: f32,
@@ -360,7 +380,7 @@ fn light_choice(world: &World, access: Access) -> String {
     s.push_str("fn choose_light(p: vec3f, n: vec3f, u: f32) -> Chosen {\n");
     if let [only] = world.lights.as_slice() {
         let _ = writeln!(s, "    let light = {};", light_literal(only));
-        s.push_str("    return Chosen(light, cap_of(light, p), 1.0, 1.0);\n}\n");
+        s.push_str("    return Chosen(light, 0u, cap_of(light, p), 1.0, 1.0);\n}\n");
         return s;
     }
     match access {
@@ -406,7 +426,7 @@ fn light_choice(world: &World, access: Access) -> String {
         let light = lights[i];
         let w = light_weight(light, cap_of(light, p), n);
         sum += w;
-        let share = w / max(sum, TINY);
+        let share = w / select(sum, 1.0, sum <= 0.0);
         let take = v < share;
         v = select((v - share) / max(1.0 - share, TINY), v / max(share, TINY), take);
         index = select(index, i, take);
@@ -418,6 +438,6 @@ fn light_choice(world: &World, access: Access) -> String {
         }
     }
     s.push_str("    let light = light_at(index);\n");
-    s.push_str("    return Chosen(light, cap_of(light, p), chosen / max(sum, TINY), sum);\n}\n");
+    s.push_str("    return Chosen(light, index, cap_of(light, p), chosen / select(sum, 1.0, sum <= 0.0), sum);\n}\n");
     s
 }
