@@ -74,12 +74,16 @@ pub struct Forecast {
     pub left: f64,
 }
 
-/// Cuts regions into tiles: disjoint rectangles that together hold the regions' pixels, each a band of
-/// rows of at most `limit` pixels (at least one row). Where the cuts lie touches no bit of the picture.
+/// The widest tile: every adapter's textures are wider (WebGPU promises 8192 texels).
+const MAX_TILE_WIDTH: u32 = 4096;
+
+/// Cuts regions into tiles: disjoint rectangles that together hold the regions' pixels, bands of rows of
+/// columns at most 4096 pixels wide, at most `limit` pixels each (at least one row). Where the cuts lie
+/// touches no bit of the picture.
 pub fn tiles(regions: &[Rect], limit: u64) -> Vec<Rect> {
     let limit = limit.min(MAX_TILE_PIXELS);
     let mut out = Vec::new();
-    for r in Rect::disjoint(regions) {
+    for r in Rect::disjoint(regions).into_iter().flat_map(columns) {
         // Bands of equal height: a sliver as the last one would cost a call of its own.
         let most = (limit / u64::from(r.width())).max(1);
         let bands = u64::from(r.height()).div_ceil(most);
@@ -92,6 +96,19 @@ pub fn tiles(regions: &[Rect], limit: u64) -> Vec<Rect> {
         }
     }
     out
+}
+
+/// A rectangle cut into columns of equal width, none wider than [`MAX_TILE_WIDTH`].
+fn columns(r: Rect) -> impl Iterator<Item = Rect> {
+    let width = r
+        .width()
+        .div_ceil(r.width().div_ceil(MAX_TILE_WIDTH).max(1))
+        .max(1);
+    (r.x0..r.x1).step_by(width as usize).map(move |x0| Rect {
+        x0,
+        x1: r.x1.min(x0.saturating_add(width)),
+        ..r
+    })
 }
 
 /// The first sample count after `count` at which the error may be looked at: whole numbers of rounds of

@@ -97,14 +97,19 @@ fn main() {
 }
 
 /// Scenes with what the figures lack: nested and planar glass, an eye in glass, a light in glass, lights flush and near,
-/// coplanar things, a room of huge spheres, a scene far from the origin.
-const HARD: [(&str, &str); 8] = [
+/// stacked and on ends of cylinders, coplanar things, a room of huge spheres, a scene far from the origin.
+const HARD: [(&str, &str); 10] = [
     ("nested_glass", include_str!("scenes/nested_glass.toml")),
     ("water", include_str!("scenes/water.toml")),
     ("eye_in_glass", include_str!("scenes/eye_in_glass.toml")),
     ("light_in_glass", include_str!("scenes/light_in_glass.toml")),
     ("near_light", include_str!("scenes/near_light.toml")),
     ("contact", include_str!("scenes/contact.toml")),
+    (
+        "lamps_on_things",
+        include_str!("scenes/lamps_on_things.toml"),
+    ),
+    ("stacked_lights", include_str!("scenes/stacked_lights.toml")),
     ("huge_walls", include_str!("scenes/huge_walls.toml")),
     ("far_away", include_str!("scenes/far_away.toml")),
 ];

@@ -17,6 +17,7 @@ use super::{BLOCK, Film, REPLICATES, Sums};
 use crate::output::atomic;
 use crate::output::error::{FileError, open};
 use crate::provenance::Provenance;
+use crate::scene::LARGEST_STRATA;
 use serde::{Deserialize, Serialize};
 use std::io::BufReader;
 use std::ops::Range;
@@ -238,7 +239,9 @@ fn check_header(header: &Header) -> Result<(), String> {
             "it has {replicates} replicates and blocks of {block} samples, not {REPLICATES} and {BLOCK}"
         ));
     }
-    if (size, strata) != (provenance.settings.size, provenance.settings.strata) || strata == 0 {
+    if (size, strata) != (provenance.settings.size, provenance.settings.strata)
+        || !(1..=LARGEST_STRATA).contains(&strata)
+    {
         return Err("its size and strata contradict its provenance".into());
     }
     for (rect, ranges) in coverage.cells() {

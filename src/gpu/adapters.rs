@@ -104,44 +104,35 @@ impl Gpu {
             ));
         }
         let wanted = choice.name.as_ref().map(|n| n.to_lowercase());
-        let fits = |a: &&wgpu::Adapter| match &wanted {
-            Some(n) => a.get_info().name.to_lowercase().contains(n),
-            None => usable(a).is_ok(),
+        let named = |a: &&wgpu::Adapter| {
+            wanted
+                .as_ref()
+                .is_none_or(|n| a.get_info().name.to_lowercase().contains(n))
         };
-        let Some(adapter) = all.iter().find(fits) else {
-            let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
-            return Err(GpuError::NoAdapter(match &choice.name {
-                Some(n) => format!(
-                    "no adapter's name contains {n:?}; there are: {}",
-                    names.join(", ")
-                ),
-                None => format!(
-                    "no adapter can be used; `etendue adapters` says why: {}",
-                    names.join(", ")
-                ),
-            }));
-        };
-        let info = describe(adapter);
-        let unable = |problem: String| GpuError::Unable {
-            adapter: info.name.clone(),
-            problem,
-        };
-        usable(adapter).map_err(unable)?;
-        let has = adapter.limits();
-        let limits = wgpu::Limits {
-            max_texture_dimension_2d: has.max_texture_dimension_2d,
-            max_buffer_size: has.max_buffer_size,
-            max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
-            ..wgpu::Limits::default()
+        let mut problem = None;
+        for adapter in all.iter().filter(named) {
+            match usable(adapter).and_then(|()| open_device(adapter)) {
+                Ok((device, queue)) => return Ok(Self::with(describe(adapter), device, queue)),
+                // The first one's: it is the one that was meant.
+                Err(e) => {
+                    problem.get_or_insert(GpuError::Unable {
+                        adapter: describe(adapter).name,
+                        problem: e,
+                    });
+                }
+            }
         }
-        .or_worse_values_from(&has);
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-            label: None,
-            required_limits: limits,
-            memory_hints: wgpu::MemoryHints::MemoryUsage,
-            ..Default::default()
+        Err(problem.unwrap_or_else(|| {
+            let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
+            let wanted = choice.name.as_deref().unwrap_or_default();
+            GpuError::NoAdapter(format!(
+                "no adapter's name contains {wanted:?}; there are: {}",
+                names.join(", ")
+            ))
         }))
-        .map_err(|e| unable(format!("it gives no device: {e}")))?;
+    }
+
+    fn with(info: DeviceInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let failure = Arc::new(Mutex::new(None));
         let keep = |slot: &Arc<Mutex<Option<String>>>, message: String| {
             slot.lock()
@@ -158,13 +149,13 @@ impl Gpu {
             }
         });
         let trip_limit = trip_limit(&info);
-        Ok(Self {
+        Self {
             device,
             queue,
             info,
             trip_limit,
             failure,
-        })
+        }
     }
 
     /// What it is.
@@ -192,6 +183,25 @@ impl Gpu {
             .map(|_| ())
             .map_err(|e| format!("waiting for the device failed: {e}"))
     }
+}
+
+/// A device with the adapter's own limits where pictures or scenes may need them.
+fn open_device(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), String> {
+    let has = adapter.limits();
+    let limits = wgpu::Limits {
+        max_texture_dimension_2d: has.max_texture_dimension_2d,
+        max_buffer_size: has.max_buffer_size,
+        max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
+        ..wgpu::Limits::default()
+    }
+    .or_worse_values_from(&has);
+    pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        label: None,
+        required_limits: limits,
+        memory_hints: wgpu::MemoryHints::MemoryUsage,
+        ..Default::default()
+    }))
+    .map_err(|e| format!("it gives no device: {e}"))
 }
 
 /// Older llvmpipe ends every loop of an invocation silently once its loops have made 65535 trips together

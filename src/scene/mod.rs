@@ -11,6 +11,8 @@ pub mod schema;
 mod source;
 mod value;
 
+pub use value::LARGEST_STRATA;
+
 use glam::DVec3;
 use std::fmt;
 use std::path::PathBuf;
