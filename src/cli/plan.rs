@@ -65,6 +65,12 @@ pub fn samples(
     if let Some(range) = &args.samples {
         return Ok(range.clone());
     }
+    Ok(0..end_for(wanted(args, settings)?, regions, held))
+}
+
+/// Samples that a pixel is to have in all, what a film holds included; [`MAX_SAMPLES`] when time or error
+/// alone end the run.
+fn wanted(args: &RenderArgs, settings: &Settings) -> Result<u64, Failure> {
     let by_rays = match args.rays {
         None => None,
         Some(rays) => Some(
@@ -78,12 +84,11 @@ pub fn samples(
                 })?,
         ),
     };
-    let wanted = match [args.spp, by_rays].into_iter().flatten().min() {
+    Ok(match [args.spp, by_rays].into_iter().flatten().min() {
         Some(n) => n,
         None if args.time.is_some() || args.error.is_some() => MAX_SAMPLES,
         None => DEFAULT_SPP,
-    };
-    Ok(0..end_for(wanted, regions, held))
+    })
 }
 
 /// The end of the range from 0 that brings every pixel to `wanted` samples, those included that it holds beyond.
@@ -128,12 +133,15 @@ pub fn count(samples: u64) -> String {
 }
 
 /// What will end the run, for the start-up line.
-pub fn ends(args: &RenderArgs, samples: &Range<u64>) -> String {
+pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
     let mut conditions = Vec::new();
     if let Some(range) = &args.samples {
         conditions.push(format!("samples {}..{} are done", range.start, range.end));
-    } else if samples.end < MAX_SAMPLES {
-        conditions.push(count(samples.end));
+    } else {
+        let wanted = wanted(args, settings)?;
+        if wanted < MAX_SAMPLES {
+            conditions.push(count(wanted));
+        }
     }
     if let Some(error) = args.error {
         conditions.push(format!("relative error {}", percent(error)));
@@ -141,7 +149,7 @@ pub fn ends(args: &RenderArgs, samples: &Range<u64>) -> String {
     if let Some(time) = args.time {
         conditions.push(format!("{} of rendering", clock(time.as_secs_f64())));
     }
-    format!("until {}", conditions.join(", or "))
+    Ok(format!("until {}", conditions.join(", or ")))
 }
 
 #[cfg(test)]

@@ -79,8 +79,11 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         time: args.time,
         error: args.error,
     };
+    if let Some(note) = &chosen.note {
+        say!("{note}");
+    }
     if !args.talk.quiet {
-        say_start(args, &scene, &settings, &chosen, &job, &film);
+        say_start(args, &scene, &settings, &chosen, &job, &film)?;
     }
 
     // Render.
@@ -204,10 +207,7 @@ fn say_start(
     chosen: &Chosen,
     job: &Job,
     film: &Film,
-) {
-    if let Some(note) = &chosen.note {
-        say!("{note}");
-    }
+) -> Result<(), Failure> {
     let suspect = check::lint(scene).len();
     if suspect > 0 {
         let s = if suspect == 1 { "" } else { "s" };
@@ -227,13 +227,14 @@ fn say_start(
         args.scene.display(),
         device.name,
         device.driver,
-        plan::ends(args, &job.samples)
+        plan::ends(args, settings)?
     );
     if let (Some(path), false) = (&args.film, film.coverage.is_empty()) {
         let held = samples_text(film);
         text += &format!("; {} holds {held}", path.display());
     }
     say!("{text}");
+    Ok(())
 }
 
 /// `120 samples a pixel`, or `119 to 120`.
@@ -308,7 +309,7 @@ fn warn(settings: &Settings, counters: &Counters) {
     }
     if let Some((x, y, sample)) = counters.first_nonfinite {
         say!(
-            "warning: {} samples were not finite and are left out, the first at pixel {x}, {y}, sample {sample}; \
+            "warning: {} samples were not finite and count as 0, the first at pixel {x}, {y}, sample {sample}; \
              this is a bug, please report the scene",
             counters.nonfinite
         );
