@@ -240,8 +240,9 @@ impl World {
     }
 }
 
-/// Centre of the small things if f32 coordinates about the file's origin would be too coarse for
-/// some radius (one part in 10⁴), else the file's own origin, whose zeros make simpler arithmetic.
+/// The middle of eye, lights and things of ordinary size if f32 coordinates about the file's origin would
+/// be too coarse for some radius (one part in 10⁴), else the file's own origin, whose zeros make simpler
+/// arithmetic.
 fn choose_origin(scene: &Scene) -> DVec3 {
     let mut sized: Vec<(DVec3, f64)> = scene.lights.iter().map(|l| (l.center, l.radius)).collect();
     for p in &scene.primitives {
@@ -257,21 +258,18 @@ fn choose_origin(scene: &Scene) -> DVec3 {
         }
     }
     let ulp = f64::from(f32::EPSILON) / 2.0;
-    let coarse = |(c, r): &(DVec3, f64)| {
-        c.length() * ulp > 1e-4 * r && c.length() < 100.0 * c.distance(scene.camera.eye) + 1e9 * r
-    };
-    if !sized.iter().any(coarse) {
+    if !sized.iter().any(|(c, r)| c.length() * ulp > 1e-4 * r) {
         return DVec3::ZERO;
     }
-    let smallest = sized.iter().map(|s| s.1).fold(f64::INFINITY, f64::min);
-    let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-    for (c, r) in &sized {
-        // Squared, so that rooms made of huge spheres do not pull.
-        let w = (smallest / r).powi(2);
-        sum += *c * w;
-        weight += w;
-    }
-    sum / weight
+    sized.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let median = sized[sized.len() / 2].1;
+    // Walls made of huge spheres have their centres far away.
+    let ordinary = sized
+        .iter()
+        .filter(|(_, r)| *r <= 10.0 * median)
+        .map(|(c, _)| *c);
+    let middle: Vec<DVec3> = ordinary.chain([scene.camera.eye]).collect();
+    middle.iter().sum::<DVec3>() / middle.len() as f64
 }
 
 fn to_world(shape: &Shape, origin: DVec3) -> Geometry {

@@ -57,6 +57,9 @@ pub fn choose(
             let note = format!("{e}; rendering on the CPU reference{faster}");
             Ok(cpu(world, settings, Some(note)))
         }
+        Err(e @ GpuError::NoAdapter(_)) if adapter.is_none() => Err(Failure::Device(format!(
+            "{e}; for a software one: {GET_ADAPTER}"
+        ))),
         Err(e) => Err(Failure::Device(e.to_string())),
     }
 }

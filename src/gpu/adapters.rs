@@ -99,9 +99,7 @@ impl Gpu {
     pub fn open(choice: &Choice) -> Result<Self, GpuError> {
         let all = sorted_adapters();
         if all.is_empty() {
-            return Err(GpuError::NoAdapter(
-                "no Vulkan adapter found; Mesa's software one is in the package mesa-vulkan-drivers".to_string(),
-            ));
+            return Err(GpuError::NoAdapter("no Vulkan adapter found".to_string()));
         }
         let wanted = choice.name.as_ref().map(|n| n.to_lowercase());
         let named = |a: &&wgpu::Adapter| {

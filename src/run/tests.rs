@@ -109,8 +109,13 @@ fn tiles_hold_each_pixel_once_within_the_limit() {
         }
     }
     assert!(cut.iter().all(|t| t.area() <= 1000));
-    // A row longer than the limit is a tile of its own.
-    assert_eq!(tiles(&[r(0, 0, 65536, 2)], 1000).len(), 2);
+    // Wide pictures are cut into columns, and a row longer than the limit is a tile of its own.
+    assert_eq!(tiles(&[r(0, 0, 65536, 2)], 1000).len(), 32);
+    assert!(
+        tiles(&[r(3, 0, 65535, 300)], u64::MAX)
+            .iter()
+            .all(|t| t.width() <= 4096)
+    );
     assert_eq!(tiles(&[Rect::whole([65536, 65536])], u64::MAX).len(), 4096);
 }
 
