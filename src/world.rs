@@ -214,24 +214,14 @@ impl World {
         }
     }
 
-    /// Whether any part of a light lies inside dielectric solid `solid`: its centre, or one of 16 points of its rim.
+    /// Whether any part of a light lies inside dielectric solid `solid`, as far as 64 points of it tell.
     pub fn holds_light(&self, solid: u32) -> bool {
         let Some(s) = self.primitives.iter().find(|p| p.solid == solid) else {
             return false;
         };
-        self.lights.iter().any(|l| {
-            let x = l.normal.any_orthonormal_vector();
-            let y = l.normal.cross(x);
-            let rim = (0..16).map(|k| {
-                let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 16.0).sin_cos();
-                l.center + (x * cos + y * sin) * l.radius
-            });
-            // A light flush on the inside of the surface lies in it.
-            let mut points = std::iter::once(l.center)
-                .chain(rim)
-                .map(|p| p + l.normal * (COINCIDENT * l.radius));
-            points.any(|p| inside(&s.geometry, p))
-        })
+        self.lights
+            .iter()
+            .any(|l| points_before(l).any(|p| inside(&s.geometry, p)))
     }
 
     /// Index of refraction of a medium relative to air: the product of the iors of the solids around it.
@@ -665,17 +655,43 @@ fn drop_what_no_path_reaches(
     });
 }
 
+/// Points spread evenly over a light, just before its front: a light flush on glass shines into what is before it.
+fn points_before(l: &WorldLight) -> impl Iterator<Item = DVec3> {
+    const COUNT: u32 = 64;
+    let x = l.normal.any_orthonormal_vector();
+    let y = l.normal.cross(x);
+    let (center, radius) = (l.center + l.normal * (COINCIDENT * l.radius), l.radius);
+    (0..COUNT).map(move |k| {
+        // A sunflower's seeds: the golden angle, and rings of equal area; the last lies on the rim.
+        let (sin, cos) = (f64::from(k) * 2.399_963_229_728_653).sin_cos();
+        center + (x * cos + y * sin) * radius * (f64::from(k) / f64::from(COUNT - 1)).sqrt()
+    })
+}
+
+/// The medium that most of a light shines in; its centre alone may just touch a glass ball.
+fn medium_before(l: &WorldLight, primitives: &[WorldPrimitive]) -> u32 {
+    let mut counts: HashMap<u32, u32> = HashMap::new();
+    for p in points_before(l) {
+        *counts.entry(medium_at(primitives, p)).or_default() += 1;
+    }
+    let most = counts
+        .into_iter()
+        .max_by_key(|&(medium, count)| (count, std::cmp::Reverse(medium)));
+    most.map_or(AIR, |(medium, _)| medium)
+}
+
 fn scale_radiance(
     lights: &mut [WorldLight],
     primitives: &[WorldPrimitive],
     materials: &[Bsdf],
     eye_medium: u32,
 ) {
+    if primitives.iter().all(|p| p.solid == AIR) {
+        return;
+    }
     let n_eye = index_of(primitives, materials, eye_medium);
     for l in lights {
-        // Just before its front: a light flush on glass shines into what is before it.
-        let before = l.center + l.normal * (COINCIDENT * l.radius);
-        let n_light = index_of(primitives, materials, medium_at(primitives, before));
+        let n_light = index_of(primitives, materials, medium_before(l, primitives));
         if n_light != n_eye {
             l.radiance *= (n_eye / n_light).powi(2);
         }
