@@ -4,6 +4,7 @@ use super::args::Backend;
 use super::failure::Failure;
 use crate::engine::{Engine, MAX_TILE_PIXELS};
 use crate::gpu::{self, GpuEngine, GpuError};
+use crate::kernel::Access;
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
 use crate::world::World;
@@ -22,6 +23,8 @@ pub struct Chosen {
     pub compile_seconds: f64,
     /// The kernel made for the scene, if there is one.
     pub wgsl: Option<String>,
+    /// How that kernel reaches the scene's values.
+    pub access: Option<Access>,
     /// The most pixels to give it at once.
     pub tile_pixels: u64,
     /// Why it is not a faster one, when that was not the user's choice.
@@ -45,6 +48,7 @@ pub fn choose(
         Ok(engine) => Ok(Chosen {
             compile_seconds: engine.compile_seconds(),
             wgsl: Some(engine.kernel().wgsl.clone()),
+            access: Some(engine.kernel().access),
             engine: Box::new(engine),
             tile_pixels: MAX_TILE_PIXELS,
             note: None,
@@ -70,6 +74,7 @@ fn cpu(world: &World, settings: &Settings, note: Option<String>) -> Chosen {
         engine: Box::new(engine),
         compile_seconds: 0.0,
         wgsl: None,
+        access: None,
         tile_pixels: CPU_TILE_PIXELS,
         note,
     }

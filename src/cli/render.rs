@@ -223,10 +223,13 @@ fn say_start(
     };
     let device = chosen.engine.device();
     let mut text = format!(
-        "{}: {width}x{height}{part} on {} ({}), {}",
+        "{}: {width}x{height}{part} on {} ({}{}), {}",
         args.scene.display(),
         device.name,
         device.driver,
+        chosen
+            .access
+            .map_or(String::new(), |a| format!(", {} kernel", a.name())),
         plan::ends(args, settings)?
     );
     if let (Some(path), false) = (&args.film, film.coverage.is_empty()) {

@@ -61,7 +61,8 @@ impl GpuEngine {
             adapter: gpu.info.name.clone(),
             problem,
         };
-        let kernel = compose(world, settings, access);
+        let access = access.unwrap_or_else(|| Access::choose_for(world, &gpu.info));
+        let kernel = compose(world, settings, Some(access));
         if kernel.trips_per_sample > gpu.trip_limit {
             return Err(unable(format!(
                 "one path of this scene may take {} loop trips (max_depth {}), and this driver silently stops an \

@@ -1,5 +1,6 @@
 //! How a kernel reaches the scene's values.
 
+use crate::engine::DeviceInfo;
 use crate::world::World;
 
 /// Scenes with more surfaces, lights included, are read from storage buffers: unrolled code costs its
@@ -22,6 +23,16 @@ impl Access {
             Self::Baked
         } else {
             Self::Buffers
+        }
+    }
+
+    /// The same on a known device. SwiftShader's compiler takes minutes over the long straight code of a dozen baked
+    /// surfaces, and a second over the loops.
+    pub fn choose_for(world: &World, device: &DeviceInfo) -> Self {
+        if device.name.contains("SwiftShader") {
+            Self::Buffers
+        } else {
+            Self::choose(world)
         }
     }
 
