@@ -160,6 +160,9 @@ fn emission(path: Path, hit: Hit) -> vec3f {
     share *= select(0.0, 1.0, path.specular);
 #endif
 #endif
+#if LIGHT_SCALES
+    share *= light_scale(path.ray.medium);
+#endif
     return light.radiance * share;
 }
 
@@ -239,6 +242,9 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
             }
 #if SEVERAL_SHADOW_RAYS
         }
+#endif
+#if LIGHT_SCALES
+        gathered *= light_scale((*path).ray.medium);
 #endif
         (*path).radiance += (*path).beta * gathered;
 #if WHITTED

@@ -96,13 +96,17 @@ fn main() {
     libtest_mimic::run(&args, trials).exit();
 }
 
-/// Scenes with what the figures lack: nested and planar glass, an eye in glass, a light in glass, lights flush and near,
+/// Scenes with what the figures lack: nested and planar glass, an eye in glass, lights in glass and half in it, lights flush and near,
 /// stacked and on ends of cylinders, coplanar things, a room of huge spheres, a scene far from the origin.
-const HARD: [(&str, &str); 10] = [
+const HARD: [(&str, &str); 11] = [
     ("nested_glass", include_str!("scenes/nested_glass.toml")),
     ("water", include_str!("scenes/water.toml")),
     ("eye_in_glass", include_str!("scenes/eye_in_glass.toml")),
     ("light_in_glass", include_str!("scenes/light_in_glass.toml")),
+    (
+        "light_through_glass",
+        include_str!("scenes/light_through_glass.toml"),
+    ),
     ("near_light", include_str!("scenes/near_light.toml")),
     ("contact", include_str!("scenes/contact.toml")),
     (

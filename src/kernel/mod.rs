@@ -231,6 +231,7 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     let sampling = depth > 1 && !world.lights.is_empty() && (diffuse || phong);
     set("LIGHT_SAMPLING", sampling);
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
+    set("LIGHT_SCALES", world.light_scales.is_some());
     set("SEVERAL_SHADOW_RAYS", settings.shadow_rays > 1);
     // A cosine-distributed bounce finds what cap sampling finds already, so only a lobe competes.
     set("MIS", sampling && phong);

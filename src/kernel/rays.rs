@@ -80,7 +80,7 @@ fn function(p: &WorldPrimitive) -> &'static str {
 
 /// The function that answers for a shadow ray, which needs no distance, what `surface.function` answers for others.
 fn shadow_function(world: &World, surface: &Surface) -> &'static str {
-    let dark = || !world.holds_light(primitive(world, surface).solid);
+    let dark = || !primitive(world, surface).holds_light;
     match surface.function {
         "sphere_outside" => "sphere_shadow",
         "sphere_boundary" if dark() => "sphere_boundary_shadow",

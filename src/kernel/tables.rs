@@ -1,5 +1,5 @@
 //! Generated WGSL: `surface_at`, `face_at`, `material_at` and `light_at`, which fetch by number what the ray functions
-//! found.
+//! found, and `light_scale`.
 //!
 //! Baked, they are chains of selections among literals: a load from a buffer at an index that differs from lane to lane
 //! costs a software adapter a trip through memory for every lane and word, which is most of a path's time.
@@ -12,6 +12,24 @@ use glam::DVec3;
 use std::fmt::Write as _;
 
 pub(super) fn generate(world: &World, access: Access) -> String {
+    let scales = world.light_scales.as_deref().map(light_scale);
+    fetches(world, access) + &scales.unwrap_or_default()
+}
+
+/// See [`World::light_scales`].
+fn light_scale(scales: &[f64]) -> String {
+    let mut s = format!(
+        "\nfn light_scale(medium: u32) -> f32 {{\n    var scale = {};\n",
+        float(scales[0])
+    );
+    for (medium, x) in scales.iter().enumerate().skip(1) {
+        let x = float(*x);
+        let _ = writeln!(s, "    scale = select(scale, {x}, medium == {medium}u);");
+    }
+    s + "    return scale;\n}\n"
+}
+
+fn fetches(world: &World, access: Access) -> String {
     match access {
         Access::Baked => baked(world),
         Access::Buffers => "\
@@ -186,12 +204,7 @@ fn baked(world: &World) -> String {
     // A face has its own identity, but for those that lie in the plane of an earlier one.
     s.push_str("\nfn face_at(key: u32, s: Surface) -> u32 {\n    var face = key + 1u;\n");
     for (i, p) in world.primitives.iter().enumerate() {
-        let parts = if matches!(p.geometry, Geometry::Cylinder { .. }) {
-            3
-        } else {
-            1
-        };
-        for part in 0..parts {
+        for part in 0..p.geometry.parts() {
             let own = key(first + i, part);
             if p.faces[part] != face(own) {
                 let _ = writeln!(

@@ -176,7 +176,7 @@ fn nested_solids_know_their_parents_in_any_order() {
                 "{inner} in {order:?}"
             );
         }
-        let n = world.index_of(by_shape(2).solid);
+        let n = world.indices[by_shape(2).solid as usize];
         assert!((n - 1.52f64.powi(5)).abs() < 1e-12, "{n}");
     }
 }
