@@ -1,17 +1,22 @@
 // The pinhole camera: jittered strata over the pixel's square, box filter.
 
 // Where in the pixel's square sample s lies, in [0, 1)^2: strata x strata cells, visited in an order
-// shuffled anew for every round of strata^2 samples.
-fn film_position(pixel: u32, s: u32, seed: u32) -> vec2f {
-    let jitter = pcg4d(vec4u(pixel, s, 0u, seed));
+// shuffled anew for every round of strata^2 samples. Glance k > 0 of the sample stays in its k-th share of that cell.
+fn film_position(pixel: u32, s: u32, seed: u32, k: u32) -> vec2f {
+    // Dimension 0; path vertices count from 1.
+    var jitter = unit_float(pcg4d(vec4u(pixel, s, select(0u, 0x40000000u + k, k > 0u), seed))).xy;
+#if SEEN_LIGHTS
+    let share = vec2f(f32((k - 1u) % GLANCES), f32((k - 1u) / GLANCES));
+    jitter = select(jitter, (share + jitter) * (1.0 / f32(GLANCES)), k > 0u);
+#endif
 #if STRATA
     let round = s / (STRATA * STRATA);
     let order = jitter_order(pixel, round, seed);
     let cell = permute(s % (STRATA * STRATA), STRATA * STRATA, order);
     let corner = vec2f(f32(cell % STRATA), f32(cell / STRATA));
-    return (corner + unit_float(jitter).xy) * (1.0 / f32(STRATA));
+    return (corner + jitter) * (1.0 / f32(STRATA));
 #else
-    return unit_float(jitter).xy;
+    return jitter;
 #endif
 }
 

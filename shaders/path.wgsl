@@ -38,6 +38,10 @@ struct Path {
     depth: u32,
     // The last scattering was specular (or there was none): light met by chance counts whole.
     specular: bool,
+#if SEEN_LIGHTS
+    // Camera rays still to be sent for what the sample sees of a light directly, before the path itself.
+    glances: u32,
+#endif
 #if MIS
     // Density of the last scattering, per solid angle; 0: light met by chance is all counted by light sampling.
     pdf: f32,
@@ -58,15 +62,48 @@ fn sample_number(i: u32, replicate: u32) -> u32 {
     return (i / ROUND_SAMPLES * REPLICATES + replicate) * ROUND_SAMPLES + i % ROUND_SAMPLES;
 }
 
-fn begin(pixel: vec2u, key: u32, s: u32) -> Path {
+// A path but for its ray.
+fn begin(glances: u32) -> Path {
     var path: Path;
-    path.ray = camera_ray(pixel, film_position(key, s, params.seed));
     path.beta = vec3f(1.0);
     path.radiance = vec3f(0.0);
     path.depth = 1u;
     path.specular = true;
+#if SEEN_LIGHTS
+    path.glances = glances;
+#endif
     return path;
 }
+
+#if SEEN_LIGHTS
+// How many camera rays a sample of this pixel sends for what it sees of a light directly. The edge of a light is by far
+// the noisiest thing in most pictures, and a camera ray costs a tenth of a path. Any answer is right; this one holds
+// where the light's disk comes near the pixel, to first order.
+fn glances_at(pixel: vec2u) -> u32 {
+    let at = vec2f(pixel) + 0.5 - CAMERA_CENTER;
+    let w = CAMERA_FORWARD + at.x * CAMERA_DX + at.y * CAMERA_DY;
+    let far = length(w);
+    let half_diagonal = 0.75 * length(CAMERA_DX);
+    var glances = 0u;
+    for (var i = 0u; i < LIGHT_KEYS / 4u; i++) {
+        let light = lights[i];
+        let to = light.center - CAMERA_EYE;
+        let height = light.offset - dot(light.normal, CAMERA_EYE);
+        let fall = dot(light.normal, w);
+        // Outside a ball around the light, first, which is all there is to say where its plane is seen from the edge.
+        let along = dot(to, w) / far;
+        let off = length(to - w * (along / far));
+        let near = along > 0.0 && off <= light.radius + half_diagonal * length(to);
+        let t = height / min(fall, -TINY);
+        let spread = 1.5 * t * half_diagonal * (1.0 - far / min(fall, -TINY));
+        let inside = length(w * t - to) <= light.radius + spread;
+        if height < 0.0 && near && (inside || fall > -3.0 * half_diagonal) {
+            glances = GLANCES * GLANCES;
+        }
+    }
+    return glances;
+}
+#endif
 
 // Whether light scattered this often on its way to the eye is kept.
 fn kept(scatterings: u32) -> bool {
@@ -104,21 +141,45 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 
     var i = params.first;
     var s = sample_number(i, params.replicate);
-    var path = begin(pixel, key, s);
+#if SEEN_LIGHTS
+    let glances = glances_at(pixel);
+#else
+    let glances = 0u;
+#endif
+    var path = begin(glances);
+    path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances));
     // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
     while i < params.end {
         var alive = false;
         let hit = intersect(path.ray);
         count.x += 1u;
 
+#if SEEN_LIGHTS
+        let glance = path.glances > 0u;
+        // What the glances have seen the path itself does not see again.
+        let blind = path.depth == 1u && glances > 0u && !glance;
+        if hit.key < LIGHT_KEYS && !blind {
+            path.radiance += path.beta * emission(path, hit) * select(1.0, 1.0 / f32(GLANCES * GLANCES), glance);
+        }
+        if !glance && hit.key >= LIGHT_KEYS && hit.key != NONE {
+#else
+        let glance = false;
         if hit.key < LIGHT_KEYS {
             // A light ends the path.
             path.radiance += path.beta * emission(path, hit);
         } else if hit.key != NONE {
+#endif
             alive = scatter_at(&path, hit, vec4u(key, s, path.depth, params.seed), &count);
         }
 
-        if !alive {
+        var glances_left = 0u;
+#if SEEN_LIGHTS
+        if glance {
+            path.glances -= 1u;
+            glances_left = path.glances;
+        }
+#endif
+        if !alive && !glance {
             // Add the sample, and start the next at once: no lane waits for a longer path.
             let l = path.radiance;
             let y = dot(l, vec3f(0.2126, 0.7152, 0.0722));
@@ -134,7 +195,11 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             }
             i += 1u;
             s = sample_number(i, params.replicate);
-            path = begin(pixel, key, s);
+            path = begin(glances);
+            glances_left = glances;
+        }
+        if !alive {
+            path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances_left));
         }
     }
     textureStore(running_out, texel, params.replicate, sum);
@@ -224,6 +289,11 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
             let pdf = to.pdf * chosen.probability;
             if cos > 0.0 && pdf > 0.0 && kept((*path).depth) {
                 var f_cos = material.color * (0.31830989 * cos);
+#if MIS_DIFFUSE
+                if material.kind == MATERIAL_DIFFUSE {
+                    f_cos *= power_heuristic(SHADOW_RAYS * pdf, cos * 0.31830989);
+                }
+#endif
 #if PHONG
                 if material.kind == MATERIAL_PHONG {
                     let power = phong_power(to.d, mirrored(d, n), material.exponent);
@@ -265,6 +335,9 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     if material.kind == MATERIAL_DIFFUSE {
         next = sample_cosine(n, u.points.zw);
         weight = material.color;
+#if MIS_DIFFUSE
+        (*path).pdf = max(dot(n, next), 0.0) * 0.31830989;
+#endif
     }
 #endif
 #if PHONG

@@ -2,6 +2,7 @@
 //! functions that meet its primitives and choose its lights.
 
 mod literal;
+mod near;
 mod preprocess;
 mod rays;
 mod select;
@@ -12,10 +13,13 @@ pub use select::{Access, BAKED_LIMIT};
 use crate::film::REPLICATES;
 use crate::scene::Bsdf;
 use crate::settings::{Integrator, LightParts, Settings};
-use crate::world::{AIR, Geometry, World};
+use crate::world::{AIR, Geometry, World, WorldLight};
 use literal::{float, vector};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+
+/// Squared, the camera rays that a sample sends in a pixel that may see a light.
+const GLANCES: u32 = 4;
 
 /// Vertices that a path keeps for certain before roulette may end it.
 const ROULETTE_DEPTH: u32 = 5;
@@ -137,7 +141,12 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     } else {
         0
     };
-    let trips_per_sample = u64::from(last_depth(settings))
+    let glances = if features.contains("SEEN_LIGHTS") {
+        u64::from(GLANCES * GLANCES)
+    } else {
+        0
+    };
+    let trips_per_sample = (u64::from(last_depth(settings)) + glances)
         .saturating_mul(1 + inner + shadow_loop + hidden)
         .saturating_add(strata_loop);
     Kernel {
@@ -233,8 +242,16 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
     set("LIGHT_SCALES", world.light_scales.is_some());
     set("SEVERAL_SHADOW_RAYS", settings.shadow_rays > 1);
-    // A cosine-distributed bounce finds what cap sampling finds already, so only a lobe competes.
-    set("MIS", sampling && phong);
+    // What a cosine-distributed bounce finds of a light, cap sampling finds as well, unless it is near.
+    let near = sampling && diffuse && near::light_near_diffuse(world);
+    set("MIS_DIFFUSE", near);
+    set("MIS", sampling && (phong || near));
+    let eye = world.camera.eye;
+    let faces_eye = |l: &WorldLight| l.normal.dot(eye) > l.offset;
+    set(
+        "SEEN_LIGHTS",
+        settings.light.emitted && world.lights.iter().any(faces_eye),
+    );
     set("WHITTED", settings.integrator == Integrator::Whitted);
     set("ALL_LIGHT", settings.light == LightParts::ALL);
     set(
@@ -280,6 +297,7 @@ fn constants(world: &World, settings: &Settings) -> String {
     constant("CAMERA_MEDIUM", "u32", format!("{}u", c.medium));
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
+    constant("GLANCES", "u32", format!("{GLANCES}u"));
     constant("REPLICATES", "u32", format!("{REPLICATES}u"));
     constant("STRATA", "u32", format!("{}u", settings.strata));
     constant("ROUND_SAMPLES", "u32", format!("{}u", settings.round()));
