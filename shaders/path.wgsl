@@ -17,10 +17,6 @@ struct Params {
     stride: u32,
 }
 
-@group(0) @binding(0) var<storage, read> surfaces: array<Surface>;
-@group(0) @binding(1) var<storage, read> materials: array<Material>;
-@group(0) @binding(2) var<storage, read> lights: array<DiskLight>;
-
 @group(1) @binding(0) var<uniform> params: Params;
 // Running sums of the block, a layer for each replicate: R, G, B, squared luminance.
 @group(1) @binding(1) var running_in: texture_2d_array<f32>;

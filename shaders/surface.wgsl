@@ -41,6 +41,10 @@ struct Material {
     exponent: f32,
 }
 
+@group(0) @binding(0) var<storage, read> surfaces: array<Surface>;
+@group(0) @binding(1) var<storage, read> materials: array<Material>;
+@group(0) @binding(2) var<storage, read> lights: array<DiskLight>;
+
 struct Vertex {
     // On the surface.
     p: vec3f,

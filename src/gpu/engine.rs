@@ -3,7 +3,7 @@
 use super::adapters::WORKGROUP;
 use super::pack::{Params, pack};
 use super::tile::Tile;
-use super::{Choice, Gpu, GpuError};
+use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
 use crate::film::coverage::Rect;
 use crate::film::{BLOCK, Film, REPLICATES, samples_before};
@@ -11,9 +11,9 @@ use crate::kernel::{Access, Kernel, compose};
 use crate::settings::Settings;
 use crate::world::World;
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use wgpu::util::DeviceExt as _;
 
 /// A submission aims to take this long: short for watchdogs and progress, long beside its overhead.
 const SUBMISSION_SECONDS: f64 = 0.1;
@@ -23,7 +23,7 @@ const SLOT: u64 = 256;
 
 /// The engine that runs a scene's kernel on a Vulkan adapter.
 pub struct GpuEngine {
-    gpu: Gpu,
+    gpu: Arc<Gpu>,
     kernel: Kernel,
     pipeline: wgpu::ComputePipeline,
     scene: wgpu::BindGroup,
@@ -51,12 +51,13 @@ impl GpuEngine {
 
     /// The same on an open device.
     pub fn on(
-        gpu: Gpu,
+        gpu: impl Into<Arc<Gpu>>,
         world: &World,
         settings: &Settings,
         access: Option<Access>,
     ) -> Result<Self, GpuError> {
         let start = Instant::now();
+        let gpu = gpu.into();
         let unable = |problem: String| GpuError::Unable {
             adapter: gpu.info.name.clone(),
             problem,
@@ -95,20 +96,7 @@ impl GpuEngine {
                 wgpu::ShaderRuntimeChecks::unchecked(),
             )
         };
-        let storage = |binding| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Storage { read_only: true },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        };
-        let scene_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("scene"),
-            entries: &[storage(0), storage(1), storage(2)],
-        });
+        let scene_layout = scene::layout(device);
         let film_layout = film_layout(device);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
@@ -123,26 +111,7 @@ impl GpuEngine {
             compilation_options: Default::default(),
             cache: None,
         });
-        let buffer = |contents: &[u8]| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("scene"),
-                contents,
-                usage: wgpu::BufferUsages::STORAGE,
-            })
-        };
-        let buffers = [
-            buffer(bytemuck::cast_slice(&packed.surfaces)),
-            buffer(bytemuck::cast_slice(&packed.materials)),
-            buffer(bytemuck::cast_slice(&packed.lights)),
-        ];
-        let scene = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("scene"),
-            layout: &scene_layout,
-            entries: &[0, 1, 2].map(|k| wgpu::BindGroupEntry {
-                binding: k as u32,
-                resource: buffers[k].as_entire_binding(),
-            }),
-        });
+        let scene = scene::bind(device, &scene_layout, &packed);
         let params = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
             size: SLOT * REPLICATES as u64,

@@ -4,6 +4,7 @@ mod adapters;
 mod engine;
 pub mod pack;
 pub mod probe;
+mod scene;
 mod tile;
 
 pub use adapters::{AdapterReport, Choice, Gpu, adapters};

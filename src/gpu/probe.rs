@@ -1,8 +1,11 @@
 //! Probes: functions of the shader modules run on chosen inputs, to hold them against closed forms and f64 twins.
 
-use super::Gpu;
 use super::adapters::WORKGROUP;
-use crate::kernel::probe_source;
+use super::pack::pack;
+use super::{Gpu, scene};
+use crate::kernel::{Access, probe_source, scene_probe_source};
+use crate::settings::Settings;
+use crate::world::World;
 use wgpu::util::DeviceExt as _;
 
 /// Numbers in and out of one invocation.
@@ -22,70 +25,133 @@ pub fn run(
     body: &str,
     inputs: &[Values],
 ) -> Result<Vec<Values>, String> {
-    let device = &gpu.device;
-    let source = probe_source(features, body);
-    let invalid = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("probe"),
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("probe"),
-        layout: None,
-        module: &module,
-        entry_point: Some("probe"),
-        compilation_options: Default::default(),
-        cache: None,
-    });
-    if let Some(e) = pollster::block_on(invalid.pop()) {
-        return Err(e.to_string());
+    Probe::compile(gpu, &probe_source(features, body), false)?.run(gpu, None, inputs)
+}
+
+/// The text of a probe that may call all that the kernel of `world` calls: `intersect`, `occluded` and so on.
+pub fn scene_source(world: &World, settings: &Settings, access: Access, body: &str) -> String {
+    scene_probe_source(world, settings, access, body)
+}
+
+/// A compiled probe.
+pub struct Probe {
+    pipeline: wgpu::ComputePipeline,
+    /// Layout of a scene's buffers, if it reads any.
+    scene: Option<wgpu::BindGroupLayout>,
+    values: wgpu::BindGroupLayout,
+}
+
+impl Probe {
+    /// Compiles `source`; `with_scene` if it is one of [`scene_source`].
+    ///
+    /// # Errors
+    /// When the module is refused.
+    pub fn compile(gpu: &Gpu, source: &str, with_scene: bool) -> Result<Self, String> {
+        let device = &gpu.device;
+        let invalid = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("probe"),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        });
+        let scene = with_scene.then(|| scene::layout(device));
+        let values = values_layout(device);
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("probe"),
+            bind_group_layouts: &[scene.as_ref(), Some(&values)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("probe"),
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some("probe"),
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        match pollster::block_on(invalid.pop()) {
+            Some(e) => Err(e.to_string()),
+            None => Ok(Self {
+                pipeline,
+                scene,
+                values,
+            }),
+        }
     }
-    let bytes = size_of_val(inputs) as u64;
-    let input = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("inputs"),
-        contents: bytemuck::cast_slice(inputs),
-        usage: wgpu::BufferUsages::STORAGE,
-    });
-    let unwritten = vec![[UNWRITTEN; 16]; inputs.len()];
-    let output = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("outputs"),
-        contents: bytemuck::cast_slice(&unwritten),
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-    });
-    let staging = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("staging"),
-        size: bytes,
-        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &[
-            wgpu::BindGroupEntry {
-                binding: 0,
-                resource: input.as_entire_binding(),
-            },
-            wgpu::BindGroupEntry {
-                binding: 1,
-                resource: output.as_entire_binding(),
-            },
-        ],
-    });
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        pass.set_pipeline(&pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups((inputs.len() as u32).div_ceil(WORKGROUP), 1, 1);
+
+    /// Runs it once for each of `inputs`. A probe of a scene takes a `world` whose [`scene_source`] is its own: that
+    /// it was compiled for, or with [`Access::Buffers`] another with as many things of the same kinds.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        world: Option<&World>,
+        inputs: &[Values],
+    ) -> Result<Vec<Values>, String> {
+        let device = &gpu.device;
+        let bytes = size_of_val(inputs) as u64;
+        let buffer = |contents: &[Values], usage| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("values"),
+                contents: bytemuck::cast_slice(contents),
+                usage: wgpu::BufferUsages::STORAGE | usage,
+            })
+        };
+        let input = buffer(inputs, wgpu::BufferUsages::empty());
+        let unwritten = vec![[UNWRITTEN; 16]; inputs.len()];
+        let output = buffer(&unwritten, wgpu::BufferUsages::COPY_SRC);
+        let staging = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("staging"),
+            size: bytes,
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let values = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &self.values,
+            entries: &[(0, &input), (1, &output)].map(|(binding, b)| wgpu::BindGroupEntry {
+                binding,
+                resource: b.as_entire_binding(),
+            }),
+        });
+        let scene = (self.scene.as_ref().zip(world))
+            .map(|(layout, world)| scene::bind(device, layout, &pack(world)));
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.pipeline);
+            if let Some(scene) = &scene {
+                pass.set_bind_group(0, scene, &[]);
+            }
+            pass.set_bind_group(1, &values, &[]);
+            pass.dispatch_workgroups((inputs.len() as u32).div_ceil(WORKGROUP), 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, bytes);
+        gpu.queue.submit([encoder.finish()]);
+        staging.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+        gpu.wait()?;
+        let mapped = staging
+            .slice(..)
+            .get_mapped_range()
+            .map_err(|e| e.to_string())?;
+        Ok(bytemuck::pod_collect_to_vec(&mapped))
     }
-    encoder.copy_buffer_to_buffer(&output, 0, &staging, 0, bytes);
-    gpu.queue.submit([encoder.finish()]);
-    staging.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-    gpu.wait()?;
-    let mapped = staging
-        .slice(..)
-        .get_mapped_range()
-        .map_err(|e| e.to_string())?;
-    Ok(bytemuck::pod_collect_to_vec(&mapped))
+}
+
+fn values_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entry = |binding, read_only| wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::COMPUTE,
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Storage { read_only },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    };
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("values"),
+        entries: &[entry(0, true), entry(1, false)],
+    })
 }

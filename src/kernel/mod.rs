@@ -103,19 +103,7 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     let access = access.unwrap_or_else(|| Access::choose(world));
     let features = features(world, settings);
     let mut wgsl = String::from("// Made for one scene by etendue.\n\n");
-    tags(&mut wgsl);
-    wgsl.push_str(&constants(world, settings));
-    for (name, text) in MODULES {
-        if needs(name, &features) {
-            let _ = write!(
-                wgsl,
-                "\n// ---- {name}.wgsl\n\n{}",
-                preprocess::run(text, &features)
-            );
-        }
-    }
-    wgsl.push_str("\n// ---- this scene\n\n");
-    wgsl.push_str(&rays::generate(world, access, &features));
+    wgsl.push_str(&scene_text(world, settings, access, &features));
     let _ = write!(
         wgsl,
         "\n// ---- path.wgsl\n\n{}",
@@ -156,6 +144,30 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     }
 }
 
+/// All that the path loop of a scene calls: constants, modules, and what is generated for the scene.
+fn scene_text(
+    world: &World,
+    settings: &Settings,
+    access: Access,
+    features: &BTreeSet<&str>,
+) -> String {
+    let mut s = String::new();
+    tags(&mut s);
+    s.push_str(&constants(world, settings));
+    for (name, text) in MODULES {
+        if needs(name, features) {
+            let _ = write!(
+                s,
+                "\n// ---- {name}.wgsl\n\n{}",
+                preprocess::run(text, features)
+            );
+        }
+    }
+    s.push_str("\n// ---- this scene\n\n");
+    s.push_str(&rays::generate(world, access, features));
+    s
+}
+
 /// A shader whose entry point `probe` runs `body` on 16 floats `x` into 16 floats `y`, beside the modules that need no
 /// scene.
 pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
@@ -167,18 +179,39 @@ pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
             s.push_str(&preprocess::run(text, &features));
         }
     }
-    s.push_str(
-        "@group(0) @binding(0) var<storage, read> inputs: array<array<f32, 16>>;\n\
-         @group(0) @binding(1) var<storage, read_write> outputs: array<array<f32, 16>>;\n\
-         @compute @workgroup_size(64)\n\
-         fn probe(@builtin(global_invocation_id) id: vec3u) {\n\
-             if id.x >= arrayLength(&inputs) { return; }\n\
-             let x = inputs[id.x];\n\
-             var y = outputs[id.x];\n",
-    );
-    s.push_str(body);
-    s.push_str("\n    outputs[id.x] = y;\n}\n");
+    s.push_str(&probe_entry(body));
     s
+}
+
+/// The same beside all that the kernel of `world` has but its path loop.
+pub(crate) fn scene_probe_source(
+    world: &World,
+    settings: &Settings,
+    access: Access,
+    body: &str,
+) -> String {
+    let mut s = scene_text(world, settings, access, &features(world, settings));
+    s.push_str(&probe_entry(body));
+    s
+}
+
+fn probe_entry(body: &str) -> String {
+    format!(
+        "
+@group(1) @binding(0) var<storage, read> inputs: array<array<f32, 16>>;
+@group(1) @binding(1) var<storage, read_write> outputs: array<array<f32, 16>>;
+@compute @workgroup_size(64)
+fn probe(@builtin(global_invocation_id) id: vec3u) {{
+    if id.x >= arrayLength(&inputs) {{
+        return;
+    }}
+    let x = inputs[id.x];
+    var y = outputs[id.x];
+{body}
+    outputs[id.x] = y;
+}}
+"
+    )
 }
 
 fn tags(s: &mut String) {
