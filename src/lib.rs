@@ -17,6 +17,7 @@ pub mod provenance;
 pub mod reference;
 pub mod run;
 pub mod scene;
+pub mod selftest;
 pub mod settings;
 pub mod stats;
 pub mod world;

@@ -17,8 +17,9 @@ Examples:
   etendue render scenes/three_materials.toml
   etendue check scenes/*.toml
   etendue adapters
+  etendue selftest
 
-Exit status: 0 done, 2 bad command line or input, 3 no adapter or it failed, 4 a file can't be read or
+Exit status: 0 done, 1 a self-test failed, 2 bad command line or input, 3 no adapter or it failed, 4 a file can't be read or
 written, 130 or 143 interrupted after saving what there is.")]
 pub struct Cli {
     /// What to do.
@@ -37,6 +38,8 @@ pub enum Command {
     Develop(DevelopArgs),
     /// Add films of the same scene
     Merge(MergeArgs),
+    /// Run the hard cases, whose answers are known, on this adapter
+    Selftest(SelftestArgs),
     /// List the adapters, which one would be taken, and why not the others
     Adapters,
     /// Print the JSON Schema of scene files
@@ -263,4 +266,32 @@ pub struct MergeArgs {
     /// Say nothing but warnings and errors
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// `etendue selftest`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  etendue selftest
+  etendue selftest --filter dome
+  etendue selftest --backend cpu --markdown > hard-cases.md
+
+Exit status 1: a case failed.")]
+pub struct SelftestArgs {
+    /// Only the cases whose row, name or description contains TEXT, in any case
+    #[arg(long, value_name = "TEXT")]
+    pub filter: Option<String>,
+    /// Print a Markdown table
+    #[arg(long)]
+    pub markdown: bool,
+    /// What is tested: any adapter (gpu), the f64 reference (cpu), or what a render would take (auto)
+    #[arg(long, value_enum, default_value_t = Backend::Auto, value_name = "NAME")]
+    pub backend: Backend,
+    /// The adapter whose name contains NAME, in any case
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+
+    /// How much to say.
+    #[command(flatten)]
+    pub talk: Talk,
 }

@@ -3,7 +3,7 @@
 use super::args::Backend;
 use super::failure::Failure;
 use crate::engine::{Engine, MAX_TILE_PIXELS};
-use crate::gpu::{self, GpuEngine, GpuError};
+use crate::gpu::{self, Gpu, GpuEngine, GpuError};
 use crate::kernel::Access;
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
@@ -53,18 +53,54 @@ pub fn choose(
             tile_pixels: MAX_TILE_PIXELS,
             note: None,
         }),
-        Err(e) if backend == Backend::Auto && adapter.is_none() => {
+        Err(e) => {
+            let note = instead(&e, backend, adapter)?;
+            Ok(cpu(world, settings, Some(note)))
+        }
+    }
+}
+
+/// The open adapter that `backend` and `adapter` ask for, whatever the scene; `None` for the CPU reference, and why it is
+/// that, when it was not the user's choice.
+pub fn open(
+    backend: Backend,
+    adapter: Option<&str>,
+) -> Result<(Option<Gpu>, Option<String>), Failure> {
+    if backend == Backend::Cpu {
+        return Ok((None, None));
+    }
+    let choice = gpu::Choice {
+        name: adapter.map(str::to_owned),
+    };
+    match Gpu::open(&choice) {
+        Ok(gpu) => Ok((Some(gpu), None)),
+        Err(e) => Ok((None, Some(instead(&e, backend, adapter)?))),
+    }
+}
+
+/// Refuses an adapter's name beside the reference.
+pub fn check_flags(backend: Backend, adapter: Option<&str>) -> Result<(), Failure> {
+    if backend == Backend::Cpu && adapter.is_some() {
+        let message = "--adapter names a GPU adapter, which --backend cpu does not use";
+        return Err(Failure::Input(message.into()));
+    }
+    Ok(())
+}
+
+/// Why it is the CPU reference instead of a GPU, where that will do; else the failure.
+fn instead(e: &GpuError, backend: Backend, adapter: Option<&str>) -> Result<String, Failure> {
+    match e {
+        _ if backend == Backend::Auto && adapter.is_none() => {
             let faster = match e {
                 GpuError::NoAdapter(_) => format!("; for a faster one: {GET_ADAPTER}"),
                 GpuError::Unable { .. } => String::new(),
             };
-            let note = format!("{e}; rendering on the CPU reference{faster}");
-            Ok(cpu(world, settings, Some(note)))
+            Ok(format!("{e}; rendering on the CPU reference{faster}"))
         }
-        Err(e @ GpuError::NoAdapter(_)) if adapter.is_none() => Err(Failure::Device(format!(
+        GpuError::NoAdapter(_) if adapter.is_none() => Err(Failure::Device(format!(
             "{e}; for a software one: {GET_ADAPTER}"
         ))),
-        Err(e) => Err(Failure::Device(e.to_string())),
+        _ => Err(Failure::Device(e.to_string())),
     }
 }
 

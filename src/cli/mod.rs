@@ -13,6 +13,7 @@ mod progress;
 mod render;
 mod saver;
 mod schema;
+mod selftest;
 mod signals;
 mod values;
 
@@ -50,6 +51,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::check(&args),
         Command::Develop(args) => develop::develop(&args),
         Command::Merge(args) => merge::merge(&args),
+        Command::Selftest(args) => selftest::selftest(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
     };
@@ -72,9 +74,12 @@ fn prepare_environment(command: &Command) {
     };
     // Mesa's layer for choosing among screens complains on stderr where there is no screen.
     set("NODEVICE_SELECT", "1");
-    if let Command::Render(args) = command
-        && let Some(threads) = args.talk.threads
-    {
+    let talk = match command {
+        Command::Render(args) => Some(args.talk),
+        Command::Selftest(args) => Some(args.talk),
+        _ => None,
+    };
+    if let Some(threads) = talk.and_then(|t| t.threads) {
         // lavapipe's own.
         set("LP_NUM_THREADS", &threads.to_string());
     }

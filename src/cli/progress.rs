@@ -56,12 +56,33 @@ impl Progress {
         }
     }
 
+    /// Shows how many of several things are done, and which is next.
+    pub fn step(&mut self, done: usize, of: usize, next: &str) {
+        match self {
+            Progress::Silent => {}
+            Progress::Lines(last) if last.elapsed() < LINE_EVERY => {}
+            Progress::Lines(last) => {
+                *last = Instant::now();
+                super::say!("{done} of {of} done, next {next}");
+            }
+            Progress::Bar(bar) => {
+                bar.set_position(STEPS * done as u64 / of.max(1) as u64);
+                bar.set_message(next.to_owned());
+            }
+        }
+    }
+
+    /// Does something that writes to the terminal without tearing the bar.
+    pub fn aside<T>(&self, f: impl FnOnce() -> T) -> T {
+        match self {
+            Progress::Bar(bar) => bar.suspend(f),
+            _ => f(),
+        }
+    }
+
     /// Says something without tearing the bar.
     pub fn say(&self, text: &str) {
-        match self {
-            Progress::Bar(bar) => bar.suspend(|| super::say!("{text}")),
-            _ => super::say!("{text}"),
-        }
+        self.aside(|| super::say!("{text}"));
     }
 
     /// Clears the bar, so that the closing lines stand alone.

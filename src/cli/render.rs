@@ -1,6 +1,6 @@
 //! `etendue render`: from a scene file to pictures, film and report.
 
-use super::args::{Backend, RenderArgs};
+use super::args::RenderArgs;
 use super::backend::{self, Chosen};
 use super::failure::Failure;
 use super::plan;
@@ -30,10 +30,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     // Whatever can be refused is refused now, before the first sample.
     let outputs = outputs(args);
     check_outputs(args, &outputs)?;
-    if args.backend == Backend::Cpu && args.adapter.is_some() {
-        let message = "--adapter names a GPU adapter, which --backend cpu does not use";
-        return Err(Failure::Input(message.into()));
-    }
+    backend::check_flags(args.backend, args.adapter.as_deref())?;
     super::set_threads(args.talk.threads);
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;

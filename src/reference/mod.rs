@@ -58,12 +58,17 @@ impl CpuEngine {
     pub fn new(world: World, settings: Settings, estimator: Estimator) -> Self {
         Self {
             tracer: Tracer::new(world, settings, estimator),
-            device: DeviceInfo {
-                name: "CPU reference (f64)".to_owned(),
-                driver: format!("{} threads", rayon::current_num_threads()),
-                backend: "cpu".to_owned(),
-                software: true,
-            },
+            device: Self::device_info(),
+        }
+    }
+
+    /// What every engine of this kind runs on.
+    pub fn device_info() -> DeviceInfo {
+        DeviceInfo {
+            name: "CPU reference (f64)".to_owned(),
+            driver: format!("{} threads", rayon::current_num_threads()),
+            backend: "cpu".to_owned(),
+            software: true,
         }
     }
 

@@ -1,0 +1,122 @@
+//! Long paths and long sums.
+
+use super::Case;
+use super::backend::{Backend, Trouble};
+use super::build::{Build, plane, v};
+use super::measure::{Measure, Tolerance};
+use crate::scene::Bsdf;
+use crate::settings::Settings;
+use glam::DVec3;
+
+pub const CASES: &[Case] = &[
+    Case {
+        row: "31",
+        name: "facing_mirrors",
+        what: "the hundredth image between facing mirrors of 0.99: drift",
+        run: facing_mirrors,
+    },
+    Case {
+        row: "37",
+        name: "constant_pixel",
+        what: "a pixel of radiance 0.1, 2²⁴ samples: f32 sums",
+        run: constant_pixel,
+    },
+    Case {
+        row: "38",
+        name: "loop_trips",
+        what: "more than 65 535 loop trips, over many samples and in one path: a driver's silent limit",
+        run: loop_trips,
+    },
+];
+
+/// Facing mirrors one apart, and a light that is met after `images` reflections; every crossing of the gap goes `step`
+/// along.
+fn corridor(reflectance: f64, images: u32, step: f64) -> Build {
+    let dull = Bsdf::Mirror {
+        reflectance: DVec3::splat(reflectance),
+    };
+    let eye = v(0.5, 0.0, 0.0);
+    // So narrow a view that all of it goes to the same image.
+    let vfov = 0.01 * step / f64::from(images);
+    Build::new(eye, eye + v(1.0, 0.0, step), vfov)
+        .size(8, 8)
+        .add(plane(DVec3::ZERO, DVec3::X), dull)
+        .add(plane(DVec3::X, -DVec3::X), dull)
+        .light(v(0.5, 0.0, step * f64::from(images)), -DVec3::Z, 2.0, 1.0)
+}
+
+fn facing_mirrors(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let build = corridor(0.99, 100, 0.1).size(48, 36);
+    let expected = 0.366_032;
+    // Roulette leaves a path in 1 / 0.366 of them, with weight 1.
+    let picture = b.picture_to(&build, &build.settings(), 0.98e-3 * expected)?;
+    Ok(vec![Measure::sampled(
+        "image 100",
+        picture.mean(),
+        expected,
+        Tolerance::Sigmas { comparisons: 1 },
+    )])
+}
+
+fn constant_pixel(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let build = Build::new(v(0.0, 0.0, 1.0), DVec3::ZERO, 40.0)
+        .size(1, 1)
+        .light(DVec3::ZERO, DVec3::Z, 9.0, 0.1);
+    let picture = b.picture(&build, &build.settings(), 1 << 24)?;
+    Ok(vec![Measure::new(
+        "mean of 2²⁴ samples",
+        picture.mean().mean,
+        0.1,
+        Tolerance::Relative(1e-6),
+    )])
+}
+
+fn loop_trips(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    // The steps are powers of two, so that any number of additions of them is exact. A perfect mirror leaves roulette
+    // nothing to do on a GPU; the reference's ends one path in a hundred at every vertex, so it gets a shorter corridor.
+    let gpu = b.open_gpu().is_some();
+    let (reflectance, images) = if gpu { (1.0, 1000) } else { (0.99, 100) };
+    let build = corridor(reflectance, images, (-10f64).exp2());
+    let settings = build.settings();
+    let at_once = b.picture(&build, &settings, 256)?;
+    let mut one_by_one = b.picture(&build, &settings, 1)?;
+    let mut engine = b.engine(&build, &settings)?;
+    for spp in 2..=256 {
+        one_by_one.go_on(engine.as_mut(), spp, &b.stop_flag())?;
+    }
+    let pairs = at_once.film.sums().iter().zip(one_by_one.film.sums());
+    let mut measures = vec![Measure::none(
+        "256 samples at once: pixels that differ from one at a time",
+        pairs.filter(|(a, b)| a != b).count(),
+    )];
+    if !gpu {
+        return Ok(measures);
+    }
+    measures.push(Measure::new(
+        "256 000 mirrors in all",
+        at_once.mean().mean,
+        1.0,
+        Tolerance::Relative(1e-5),
+    ));
+    let images = 70_000;
+    let build = corridor(1.0, images, (-13f64).exp2());
+    let settings = Settings {
+        max_depth: images + 100,
+        ..build.settings()
+    };
+    match b.picture(&build, &settings, 4) {
+        Ok(picture) => measures.push(Measure::new(
+            "70 000 mirrors in one path",
+            picture.mean().mean,
+            1.0,
+            Tolerance::Relative(1e-5),
+        )),
+        // Before anything is rendered; a picture cut short would be the failure.
+        Err(Trouble::Unable(why)) => measures.push(Measure::none(
+            "70 000 mirrors in one path, refused: other reasons than its loop trips",
+            usize::from(!why.contains("loop trips")),
+        )),
+        Err(e) => return Err(e),
+    }
+    Ok(measures)
+}

@@ -1,0 +1,202 @@
+//! A sphere closed by a disk light. With F = half the height of the cap behind the light, over the radius, every point of
+//! the wall has L = ρ Le F / (1 - ρ (1 - F)), which is Le for ρ = 1: what loses no energy then vanishes.
+
+use super::backend::{Backend, Trouble};
+use super::build::{Build, GLASS, MIRROR, cylinder, grey, plane, sphere, v};
+use super::measure::{Measure, Tolerance};
+use super::{Case, backend::Picture};
+use crate::scene::{Bsdf, Shape};
+use glam::DVec3;
+
+pub const CASES: &[Case] = &[
+    Case {
+        row: "8",
+        name: "glass_sphere_in_dome",
+        what: "a glass ball in the white dome: energy",
+        run: glass_ball,
+    },
+    Case {
+        row: "9",
+        name: "eye_in_glass_in_dome",
+        what: "an eye in a glass ball, nearer its centre than R/n: radiance grows by n²",
+        run: eye_in_glass,
+    },
+    Case {
+        row: "16",
+        name: "touching_glass_in_dome",
+        what: "two glass balls that touch, a ball that touches a plane: surfaces that coincide",
+        run: touching_glass,
+    },
+    Case {
+        row: "17",
+        name: "opaque_things_in_dome",
+        what: "a white ball, a mirror ball, a white rod in the white dome: rays that leave surfaces",
+        run: opaque_things,
+    },
+    Case {
+        row: "18",
+        name: "furnace_chord",
+        what: "light on a chord at 0.6 R, walls of 0.5: the light's rim",
+        run: chord,
+    },
+    Case {
+        row: "19",
+        name: "furnace_of_long_paths",
+        what: "walls of 0.999, a light that fills a hundredth of their view: roulette and depth limit",
+        run: long_paths,
+    },
+    Case {
+        row: "32",
+        name: "touching_mirrors_in_dome",
+        what: "two mirror balls that touch in the white dome: chaotic paths",
+        run: touching_mirrors,
+    },
+];
+
+/// The white upper half of a sphere of radius 1 over a light of radiance 1.
+fn dome(eye: DVec3, look_at: DVec3, vfov: f64, things: &[(Shape, Bsdf)]) -> Build {
+    Build::new(eye, look_at, vfov)
+        .add(sphere(DVec3::ZERO, 1.0), grey(1.0))
+        .add_all(things)
+        .light(DVec3::ZERO, DVec3::Y, 1.0, 1.0)
+}
+
+const EYE: DVec3 = DVec3::new(0.0, 0.3, 0.9);
+const MIDDLE: DVec3 = DVec3::new(0.0, 0.4, 0.0);
+
+/// The whole picture within 10⁻³ of `expected`, and no part of it far off.
+fn all_of_it(
+    b: &Backend,
+    what: &str,
+    build: &Build,
+    expected: f64,
+) -> Result<Vec<Measure>, Trouble> {
+    let picture = b.picture_to(build, &build.settings(), 3.3e-4 * expected)?;
+    Ok(vec![
+        Measure::sampled(
+            format!("{what}: mean"),
+            picture.mean(),
+            expected,
+            Tolerance::Relative(1e-3),
+        ),
+        picture.even(&format!("{what}: blocks"), 6, expected),
+    ])
+}
+
+fn glass_ball(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let build = dome(EYE, MIDDLE, 40.0, &[(sphere(MIDDLE, 0.25), GLASS)]);
+    all_of_it(b, "radiance", &build, 1.0)
+}
+
+fn eye_in_glass(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    // Nearer to the centre than R / n nothing is totally reflected.
+    let eye = v(0.05, 0.45, 0.05);
+    let build = dome(
+        eye,
+        v(0.0, 0.35, 0.0),
+        60.0,
+        &[(sphere(MIDDLE, 0.25), GLASS)],
+    );
+    all_of_it(b, "radiance", &build, 1.52 * 1.52)
+}
+
+/// A wide view whose mean is known to four standard errors, and a long lens on the point of contact.
+fn contact(
+    b: &Backend,
+    what: &str,
+    at: DVec3,
+    things: &[(Shape, Bsdf)],
+) -> Result<Vec<Measure>, Trouble> {
+    let wide = dome(EYE, MIDDLE, 50.0, things);
+    let picture = b.picture_to(&wide, &wide.settings(), 0.9e-3)?;
+    let mut measures = vec![Measure::sampled(
+        format!("{what}: wide view"),
+        picture.mean(),
+        1.0,
+        Tolerance::Sigmas { comparisons: 1 },
+    )];
+    let close = dome(EYE, at, 3.0, things);
+    measures.extend(all_of_it(b, &format!("{what}: contact"), &close, 1.0)?);
+    Ok(measures)
+}
+
+fn touching_glass(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let ball = |x: f64| (sphere(v(x, 0.4, 0.0), 0.2), GLASS);
+    let mut measures = contact(b, "two balls", MIDDLE, &[ball(-0.2), ball(0.2)])?;
+    // The plane cuts the dome: the part with eye and light is a furnace too.
+    let wall = (plane(v(-0.25, 0.0, 0.0), DVec3::X), grey(1.0));
+    let at = v(-0.25, 0.4, 0.0);
+    measures.extend(contact(b, "ball and plane", at, &[wall, ball(-0.05)])?);
+    Ok(measures)
+}
+
+fn opaque_things(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let things = [
+        (sphere(v(-0.35, 0.4, 0.0), 0.2), grey(1.0)),
+        (sphere(v(0.1, 0.35, 0.1), 0.18), MIRROR),
+        (
+            cylinder(v(0.35, 0.2, 0.0), v(0.5, 0.5, -0.1), 0.12),
+            grey(1.0),
+        ),
+    ];
+    let build = dome(EYE, MIDDLE, 60.0, &things);
+    all_of_it(b, "radiance", &build, 1.0)
+}
+
+fn touching_mirrors(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let ball = |x: f64| (sphere(v(x, 0.4, 0.0), 0.2), MIRROR);
+    contact(b, "two balls", MIDDLE, &[ball(-0.2), ball(0.2)])
+}
+
+/// A sphere of radius 1 and reflectance `rho` over a light on the plane y = -`chord`, seen from inside.
+fn furnace(rho: f64, chord: f64) -> Build {
+    let light = (1.0 - chord * chord).sqrt();
+    Build::new(v(0.0, -0.2, 0.0), v(0.0, 1.0, 0.01), 90.0)
+        .add(sphere(DVec3::ZERO, 1.0), grey(rho))
+        .light(v(0.0, -chord, 0.0), DVec3::Y, light, 1.0)
+}
+
+fn chord(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let build = furnace(0.5, 0.6).size(8, 6);
+    let expected = 1.0 / 6.0;
+    // Each of the 48 pixels to 10⁻³; all of them to a seventh of that.
+    let picture: Picture = b.picture_to(&build, &build.settings(), 1.3e-4 * expected)?;
+    Ok(vec![
+        Measure::sampled(
+            "mean of the wall",
+            picture.mean(),
+            expected,
+            Tolerance::Relative(1e-3),
+        ),
+        picture.even("pixels of the wall", 1, expected),
+        Measure::new(
+            "largest standard error of a pixel",
+            picture
+                .blocks(1)
+                .iter()
+                .map(|m| m.error)
+                .fold(0.0, f64::max),
+            1e-3 * expected,
+            Tolerance::Below,
+        ),
+    ])
+}
+
+fn long_paths(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let build = furnace(0.999, 0.98);
+    let expected = 0.909_01;
+    // A path has a hundred vertices here, and half the tolerance is all that is paid for.
+    let picture = b.picture_to(&build, &build.settings(), 0.98e-3 * expected)?;
+    Ok(vec![
+        Measure::sampled(
+            "radiance",
+            picture.mean(),
+            expected,
+            Tolerance::Relative(2e-3),
+        ),
+        Measure::none(
+            "paths cut at the depth limit",
+            picture.counters.truncated as usize,
+        ),
+    ])
+}
