@@ -37,12 +37,13 @@ pub fn selftest(args: &SelftestArgs) -> Result<(), Failure> {
             Ok(found) => {
                 measures += found.len();
                 failed += found.iter().filter(|m| !m.passed()).count();
-                found.iter().map(|m| table.line(case, m)).collect()
+                table.lines(case, &found)
             }
             Err(Trouble::Unable(why)) => {
                 measures += 1;
                 failed += 1;
-                table.row([case.row, case.name, &why, "", "", "", "FAILED"])
+                let why: Vec<&str> = why.split_whitespace().collect();
+                table.row([case.row, case.name, &why.join(" "), "", "", "", "FAILED"])
             }
             Err(Trouble::Device(why)) => return Err(Failure::Device(why)),
             Err(Trouble::Stopped) => {
@@ -117,23 +118,33 @@ impl Table {
         text
     }
 
-    fn line(&self, case: &Case, m: &Measure) -> String {
-        let [measured, expected, tolerance] = m.texts();
-        let verdict = if m.passed() { "passed" } else { "FAILED" };
-        self.row([
-            case.row,
-            case.name,
-            &m.quantity,
-            &measured,
-            &expected,
-            &tolerance,
-            verdict,
-        ])
+    /// The lines of one case; in Markdown the first says what it is about.
+    fn lines(&self, case: &Case, measures: &[Measure]) -> String {
+        let mut text = String::new();
+        for (k, m) in measures.iter().enumerate() {
+            let [measured, expected, tolerance] = m.texts();
+            let verdict = if m.passed() { "passed" } else { "FAILED" };
+            let name = match k {
+                0 if self.markdown => format!("{}: {}", case.name, case.what),
+                _ if self.markdown => String::new(),
+                _ => case.name.to_owned(),
+            };
+            text += &self.row([
+                case.row,
+                &name,
+                &m.quantity,
+                &measured,
+                &expected,
+                &tolerance,
+                verdict,
+            ]);
+        }
+        text
     }
 
     fn row(&self, cells: [&str; 7]) -> String {
         if self.markdown {
-            return format!("| {} |\n", cells.join(" | ").replace('\n', " "));
+            return format!("| {} |\n", cells.join(" | "));
         }
         let mut line = String::new();
         for (cell, width) in cells.iter().zip(WIDTHS) {

@@ -282,9 +282,10 @@ fn close_receiver(b: &Backend) -> Result<Vec<Measure>, Trouble> {
 }
 
 fn behind_a_light(b: &Backend) -> Result<Vec<Measure>, Trouble> {
-    // Something bright beyond the black back.
+    // Something bright beyond the black back; and a thing, for there is no scene without, where nobody sees it.
     let facing = |side: f64| {
         Build::new(v(0.0, 0.0, 3.0 * side), DVec3::ZERO, 5.0)
+            .add(sphere(v(0.0, 9.0, 0.0), 1.0), grey(0.5))
             .light(DVec3::ZERO, DVec3::Z, 1.0, 7.0)
             .light(v(0.0, 0.0, 4.0), -DVec3::Z, 0.5, 100.0)
     };
@@ -292,8 +293,8 @@ fn behind_a_light(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     let front = b.picture(&front, &front.settings(), 16)?;
     let back = facing(-1.0);
     let back = b.picture(&back, &back.settings(), 16)?;
-    // A floor under a light that shines up, and a bright one above that.
-    let floor = Build::new(v(0.0, 0.5, 5.0), DVec3::ZERO, 10.0)
+    // A floor under a light that shines up, and a bright one above that; all that is seen lies in its shadow.
+    let floor = Build::new(v(0.0, 0.9, 2.0), DVec3::ZERO, 30.0)
         .add(plane(DVec3::ZERO, DVec3::Y), grey(1.0))
         .light(v(0.0, 1.0, 0.0), DVec3::Y, 3.0, 1.0)
         .light(v(0.0, 2.0, 0.0), -DVec3::Y, 0.1, 100.0);

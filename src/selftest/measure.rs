@@ -165,6 +165,7 @@ impl Measure {
         };
         let tolerance = match self.tolerance {
             Tolerance::Exact => "exact".to_owned(),
+            Tolerance::Absolute(t) if t >= 1.0 => format!("± {t}"),
             Tolerance::Absolute(t) => format!("± {t:e}"),
             Tolerance::Relative(t) => format!("± {t:e} of it"),
             Tolerance::Sigmas { .. } => "4 σ".to_owned(),
@@ -183,7 +184,7 @@ fn digits(x: f64) -> String {
     } else if (1e-3..1e6).contains(&size) {
         let places = (5.0 - size.log10().floor()) as usize;
         let text = format!("{x:.places$}");
-        text.trim_end_matches('0').to_owned()
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
     } else {
         format!("{x:.4e}")
     }
@@ -234,6 +235,7 @@ mod tests {
             (2.310_4, "2.3104"),
             (99_999.5, "99999.5"),
             (5.784e-6, "5.7840e-6"),
+            (0.999_999_99, "1"),
             (f64::INFINITY, "inf"),
             (f64::NAN, "NaN"),
         ] {
