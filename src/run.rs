@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// How long a call to the engine should take: short enough for progress to move and for a signal to be
 /// heeded, long enough that the calls' own cost does not matter.
-const CALL_SECONDS: f64 = 0.4;
+pub const CALL: Duration = Duration::from_millis(400);
 
 /// Factor between the sample counts at which the error is looked at.
 const CHECK_FACTOR: f64 = 1.25;
@@ -35,6 +35,8 @@ pub struct Job {
     pub time: Option<Duration>,
     /// Stop when the relative error is at most this.
     pub error: Option<f64>,
+    /// How long a call to the engine should take at most, usually [`CALL`].
+    pub call: Duration,
 }
 
 /// What ended a run.
@@ -235,7 +237,7 @@ impl<'a> Run<'a> {
         let mut length = longest;
         if let Some(pace) = self.pace {
             let fits = |seconds: f64, pixels: u64| (seconds / (pace * pixels as f64)) as u64;
-            length = length.min(fits(CALL_SECONDS, self.widest));
+            length = length.min(fits(self.job.call.as_secs_f64(), self.widest));
             if let Some(time) = self.job.time {
                 // So that all tiles come to the same count when the time ends.
                 let left = (time.as_secs_f64() - self.tally.seconds).max(0.0);

@@ -2,113 +2,13 @@
 //!
 //! Everything runs on the CPU reference, so that these tests need no adapter.
 
-use assert_cmd::Command;
-use etendue::film::{Film, store};
-use etendue::output::{Picture, read_exr};
+mod program;
+
+use etendue::output::Picture;
 use predicates::prelude::*;
+use program::{Bench, SCENE, says};
 use std::fs;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use tempfile::TempDir;
-
-/// A box with a mirror, a glass ball and a light: every flag has something to act on.
-const SCENE: &str = r#"
-title = "Test box"
-
-[camera]
-eye        = [0.0, 1.0, 3.0]
-look_at    = [0.0, 0.9, 0.0]
-vfov       = 45.0
-resolution = [24, 16]
-
-[material.white]
-type        = "diffuse"
-reflectance = [0.7, 0.6, 0.5]
-
-[material.steel]
-type = "mirror"
-
-[material.glass]
-type = "dielectric"
-
-[[plane]]
-point    = [0.0, 0.0, 0.0]
-normal   = [0.0, 1.0, 0.0]
-material = "white"
-
-[[plane]]
-point    = [0.0, 0.0, -1.5]
-normal   = [0.0, 0.0, 1.0]
-material = "white"
-
-[[sphere]]
-center   = [-0.5, 0.5, -0.5]
-radius   = 0.45
-material = "steel"
-
-[[sphere]]
-center   = [0.6, 0.5, 0.0]
-radius   = 0.4
-material = "glass"
-
-[[light]]
-center   = [0.0, 2.2, 0.0]
-normal   = [0.0, -1.0, 0.0]
-radius   = 0.5
-radiance = [8.0, 8.0, 8.0]
-"#;
-
-/// A folder with `box.toml` in it, which is the working directory of every command.
-struct Bench {
-    dir: TempDir,
-}
-
-impl Bench {
-    fn new() -> Self {
-        let dir = tempfile::tempdir().expect("a temporary folder");
-        fs::write(dir.path().join("box.toml"), SCENE).expect("a scene file");
-        Self { dir }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.dir.path().join(name)
-    }
-
-    /// `etendue ARGS`, words separated by blanks.
-    fn run(&self, args: &str) -> assert_cmd::assert::Assert {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_etendue"));
-        command.current_dir(self.dir.path());
-        command.args(args.split_whitespace());
-        command.assert()
-    }
-
-    /// `etendue render box.toml --backend cpu ARGS`, which must succeed.
-    fn render(&self, args: &str) {
-        self.run(&format!("render box.toml --backend cpu {args}"))
-            .success();
-    }
-
-    fn picture(&self, name: &str) -> Picture {
-        read_exr(&self.path(name)).expect("a picture of ours")
-    }
-
-    fn film(&self, name: &str) -> Film {
-        store::load(&self.path(name)).expect("a film of ours").0
-    }
-
-    /// Names in the folder, sorted.
-    fn names(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.dir.path()).expect("our own folder");
-        let name = |e: std::io::Result<fs::DirEntry>| e.unwrap().file_name().into_string().unwrap();
-        let mut names: Vec<String> = entries.map(name).collect();
-        names.sort();
-        names
-    }
-}
-
-fn says(text: &str) -> predicates::str::ContainsPredicate {
-    predicate::str::contains(text)
-}
 
 // Exit statuses.
 

@@ -46,6 +46,7 @@ pub fn main() -> ExitCode {
         }
     };
     prepare_environment(&cli.command);
+    signals::outlive_size_limits();
     let done = match cli.command {
         Command::Render(args) => render::render(&args),
         Command::Check(args) => check::check(&args),

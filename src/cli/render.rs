@@ -5,7 +5,7 @@ use super::backend::{self, Chosen};
 use super::failure::Failure;
 use super::plan;
 use super::progress::{Progress, clock, percent};
-use super::saver::Saver;
+use super::saver::{Saver, longest_call};
 use super::signals::Signals;
 use super::{memory, say};
 use crate::engine::Counters;
@@ -75,6 +75,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         round: settings.round(),
         time: args.time,
         error: args.error,
+        call: longest_call(args),
     };
     if let Some(note) = &chosen.note {
         say!("{note}");
@@ -96,14 +97,24 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let tally = run.tally;
     progress.finish();
 
-    // Save what there is, whatever ended the run; pictures only of a run that did not fail.
+    // Save what there is, whatever ended the run; pictures only of a run that did not fail, but even if the film
+    // could not be saved: then they are all that is left.
     let provenance = saver.provenance(&film, &tally);
     let mut written = Vec::new();
+    let mut saved = Ok(());
     if let Some(path) = args.film.as_ref().filter(|_| tally.counters.paths > 0) {
-        store::save(path, &film, &provenance)?;
-        written.push(path.display().to_string());
+        saved = store::save(path, &film, &provenance);
+        if saved.is_ok() {
+            written.push(path.display().to_string());
+        }
     }
-    let reason = ended?;
+    let reason = match (ended, &saved) {
+        (Err(failure), Err(e)) => {
+            say!("warning: {e}");
+            return Err(failure);
+        }
+        (ended, _) => ended?,
+    };
     if !film.coverage.is_empty() {
         for path in outputs.iter().chain(&args.watch) {
             let format = Format::from_path(path).map_err(Failure::Input)?;
@@ -130,6 +141,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         say_end(&film, &provenance, &tally, reason, &written);
     }
     warn(&settings, &tally.counters);
+    saved?;
     match reason {
         StopReason::Interrupted => Err(Failure::Interrupted {
             signal: signals.number(),

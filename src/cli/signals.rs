@@ -1,9 +1,17 @@
-//! Ctrl-C and SIGTERM as a flag that the render loop reads; a second signal ends the process at once.
+//! Ctrl-C and SIGTERM as a flag that the render loop reads; a second signal ends the process at once. And the
+//! signal that must not end it.
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// A write beyond the limit on file sizes (`ulimit -f`) then fails like one to a full disk, with a message, instead of
+/// ending the process.
+pub fn outlive_size_limits() {
+    // Nobody reads the flag. Where there is no handler, the limit is as deadly as it was.
+    let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
+}
 
 /// The two signals' handlers, installed for the rest of the process.
 pub struct Signals {

@@ -87,6 +87,7 @@ fn job(size: [u32; 2], limit: u64, samples: Range<u64>) -> Job {
         round: 4,
         time: None,
         error: None,
+        call: CALL,
     }
 }
 

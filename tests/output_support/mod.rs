@@ -1,5 +1,7 @@
 //! Films and provenances to write, and the independent reader.
 
+#![allow(dead_code, reason = "every test binary uses its own part of it")]
+
 use etendue::engine::{Counters, DeviceInfo};
 use etendue::film::coverage::Rect;
 use etendue::film::{BLOCK, Film, REPLICATES, Sums};
