@@ -40,6 +40,14 @@ pub struct DeviceInfo {
     pub software: bool,
 }
 
+impl DeviceInfo {
+    /// Whether a sample has the same bits on both. How many threads the CPU reference has is no matter.
+    pub fn rounds_like(&self, other: &Self) -> bool {
+        (&self.name, &self.backend) == (&other.name, &other.backend)
+            && (self.backend == "cpu" || self.driver == other.driver)
+    }
+}
+
 /// Counts over a call or a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Counters {

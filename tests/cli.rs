@@ -453,25 +453,6 @@ fn slices_merge_to_the_single_run_in_any_order() {
 }
 
 #[test]
-fn quadrants_merge_to_the_whole() {
-    let bench = Bench::new();
-    let mut names = String::new();
-    for (i, region) in ["0,0,12,8", "12,0,24,8", "0,8,12,16", "12,8,24,16"]
-        .iter()
-        .enumerate()
-    {
-        bench.render(&format!(
-            "--spp 20 --region {region} --film q{i}.npz -o q.png"
-        ));
-        names += &format!(" q{i}.npz");
-    }
-    bench.run(&format!("merge whole.npz{names}")).success();
-    bench.run("develop whole.npz -o whole.exr").success();
-    bench.render("--spp 20 -o one.exr");
-    assert_eq!(bench.picture("whole.exr").rgb, bench.picture("one.exr").rgb);
-}
-
-#[test]
 fn merge_names_what_does_not_fit() {
     let bench = Bench::new();
     bench.render("--samples 0..8 --film a.npz -o a.png");
@@ -509,6 +490,7 @@ fn a_film_of_something_else_is_refused_and_untouched() {
         ("--max-depth 3", "max_depth"),
         ("--light direct", "light"),
         ("--integrator whitted", "integrator"),
+        ("--shadow-rays 2", "shadow_rays"),
     ] {
         bench
             .run(&format!(

@@ -7,7 +7,9 @@ use etendue::film::store::{load, save};
 use etendue::film::{Film, REPLICATES};
 use etendue::output::FileError;
 use etendue::provenance::Provenance;
-use output_support::{Random, described, region_film, render, seen_from_python, whole_film};
+use output_support::{
+    Random, described, forge, negate_first_count, region_film, render, seen_from_python, whole_film,
+};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -161,42 +163,12 @@ fn other_kinds_of_files_are_named() {
     }
 }
 
-/// Saves a film whose JSON says `to` where it said `from`, of the same length or shorter, with every
-/// checksum right: what a program gone wrong, not a disk, would leave.
+/// The error of loading a film whose JSON says `to` where it said `from`.
 fn forged(dir: &Path, film: &Film, from: &str, to: &str) -> String {
     let (path, _) = saved(dir, film);
     let mut bytes = fs::read(&path).unwrap();
-    let find = |bytes: &[u8], what: &[u8]| {
-        bytes
-            .windows(what.len())
-            .position(|w| w == what)
-            .unwrap_or_else(|| panic!("{from} is not in the file"))
-    };
-    let padded = format!("{to:width$}", width = from.len());
-    let at = find(&bytes, from.as_bytes());
-    bytes[at..at + from.len()].copy_from_slice(padded.as_bytes());
-    reseal(&mut bytes);
+    forge(&mut bytes, from, to);
     refused(&path, &bytes)
-}
-
-/// Makes all checksums of the archive right again.
-fn reseal(bytes: &mut [u8]) {
-    let mut at = 0;
-    let mut sums = Vec::new();
-    while bytes[at..at + 4] == *b"PK\x03\x04" {
-        let name = usize::from(bytes[at + 26]);
-        let size_at = at + 30 + name + 4;
-        let size = u64::from_le_bytes(bytes[size_at..size_at + 8].try_into().unwrap()) as usize;
-        let data = size_at + 16;
-        let crc = crc32fast::hash(&bytes[data..data + size]).to_le_bytes();
-        bytes[at + 14..at + 18].copy_from_slice(&crc);
-        sums.push(crc);
-        at = data + size;
-    }
-    for crc in sums {
-        bytes[at + 16..at + 20].copy_from_slice(&crc);
-        at += 46 + usize::from(bytes[at + 28]) + 28;
-    }
 }
 
 #[test]
@@ -309,10 +281,7 @@ fn bad_numbers_are_refused_with_their_pixel() {
     // A negative count: the first pixel's made -1 in place.
     let (path, _) = saved(dir.path(), &whole_film());
     let mut bytes = fs::read(&path).unwrap();
-    let count = 300u64.to_le_bytes().repeat(3);
-    let at = bytes.windows(24).position(|w| w == count).unwrap();
-    bytes[at..at + 8].copy_from_slice(&(-1i64).to_le_bytes());
-    reseal(&mut bytes);
+    negate_first_count(&mut bytes, 300);
     let text = refused(&path, &bytes);
     assert!(text.contains("pixel (0, 0) counts -1 samples"), "{text}");
 }
@@ -336,10 +305,7 @@ fn a_small_file_that_claims_to_be_huge_is_refused_at_once() {
     save(&path, &huge, &provenance).unwrap();
     assert_eq!(load(&path).unwrap().0, huge);
     let mut bytes = fs::read(&path).unwrap();
-    let json = b"\"x1\":6,\"y1\":4";
-    let at = bytes.windows(json.len()).position(|w| w == json).unwrap();
-    bytes[at + 5] = b'7';
-    reseal(&mut bytes);
+    forge(&mut bytes, "\"x1\":6,\"y1\":4", "\"x1\":7,\"y1\":4");
     let text = refused(&path, &bytes);
     assert!(text.contains("array \"counts\" has"), "{text}");
 }

@@ -3,15 +3,16 @@
 use super::args::MergeArgs;
 use super::failure::Failure;
 use super::{memory, say};
-use crate::film::merge::{holes, merge as add};
-use crate::film::store;
+use crate::film::merge::{MergeError, holes, merge as add};
+use crate::film::store::{self, Outline};
 use crate::output::{FileError, atomic};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Holes that are listed; more would hide the rest.
 const LISTED_HOLES: usize = 8;
 
-/// Loads one film after the other, so that memory never holds more than the sum and one of them.
+/// Loads one film after the other, so that memory never holds more than the sum and one of them. They are added in the
+/// order of their samples, whatever that of the command line: the sum has the same bits.
 pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     if args.out.exists() {
         let message = "it exists already, and films are never replaced; remove it or name another";
@@ -22,13 +23,15 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
         .into());
     }
     atomic::check_writable(&args.out)?;
-    let first = &args.films[0];
+    let films = fitting(&args.films)?;
+    let (first, _) = films[0];
     let (mut film, mut provenance) = store::load(first)?;
-    for path in &args.films[1..] {
+    for (path, _) in &films[1..] {
         let (other, its) = store::load(path)?;
-        let refuse = |why: String| refused(first, path, &why);
-        provenance.same_samples(&its).map_err(refuse)?;
-        memory::check(film.bounds.union(&other.bounds).area() - film.bounds.area())?;
+        // Checked before, but a file may have been replaced since.
+        provenance
+            .same_samples(&its)
+            .map_err(|e| refused(first, path, &e))?;
         add(&mut film, &other).map_err(|e| refused(first, path, &e.to_string()))?;
         provenance.absorb(&its);
     }
@@ -51,6 +54,30 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
         );
     }
     Ok(())
+}
+
+/// The films and what they say of themselves, in the order of their samples. Refuses films that don't fit together, by
+/// name, before any is loaded.
+fn fitting(paths: &[PathBuf]) -> Result<Vec<(&Path, Outline)>, Failure> {
+    let mut films: Vec<(&Path, Outline)> = Vec::new();
+    for path in paths {
+        let new = store::outline(path)?;
+        for (other, its) in &films {
+            its.provenance
+                .same_samples(&new.provenance)
+                .map_err(|e| refused(other, path, &e))?;
+            MergeError::overlap(&its.coverage, &new.coverage)
+                .map_err(|e| refused(other, path, &e.to_string()))?;
+        }
+        films.push((path, new));
+    }
+    films.sort_by_key(|(_, film)| film.coverage.first());
+    let sum = films[1..]
+        .iter()
+        .fold(films[0].1.bounds, |sum, (_, film)| sum.union(&film.bounds));
+    let largest = films.iter().map(|(_, film)| film.bounds.area()).max();
+    memory::check(sum.area() + largest.unwrap_or(0))?;
+    Ok(films)
 }
 
 /// Names both films: the fault is in the pair.

@@ -8,7 +8,7 @@ use super::progress::{Progress, clock, percent};
 use super::saver::{Saver, longest_call};
 use super::signals::Signals;
 use super::{memory, say};
-use crate::engine::Counters;
+use crate::engine::{Counters, DeviceInfo};
 use crate::film::coverage::Rect;
 use crate::film::{Film, store};
 use crate::kernel;
@@ -82,6 +82,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     if !args.talk.quiet {
         say_start(args, &scene, &settings, &chosen, &job, &film)?;
+        say_other_adapters(args, &provenance, chosen.engine.device());
     }
 
     // Render.
@@ -247,6 +248,24 @@ fn say_start(
     }
     say!("{text}");
     Ok(())
+}
+
+/// A note on a film that was rendered elsewhere.
+fn say_other_adapters(args: &RenderArgs, held: &Provenance, device: &DeviceInfo) {
+    let others: Vec<String> = held
+        .devices
+        .iter()
+        .filter(|used| !used.device.rounds_like(device))
+        .map(|used| format!("{} ({})", used.device.name, used.device.driver))
+        .collect();
+    if let (Some(path), false) = (&args.film, others.is_empty()) {
+        say!(
+            "note: {} holds samples made on {}; {} rounds differently, and the picture is the same up to its noise",
+            path.display(),
+            others.join(", "),
+            device.name
+        );
+    }
 }
 
 /// `120 samples a pixel`, or `119 to 120`.

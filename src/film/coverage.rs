@@ -165,6 +165,23 @@ impl Coverage {
         })
     }
 
+    /// Pixels and sample numbers that both have, if there are any.
+    pub fn common(&self, other: &Self) -> Option<(Rect, Range<u64>)> {
+        other
+            .cells()
+            .flat_map(|(rect, ranges)| ranges.iter().map(move |samples| (rect, samples)))
+            .find_map(|(rect, samples)| self.overlap(rect, samples))
+    }
+
+    /// The lowest sample number, and the first pixels that have it; `None` when nothing is covered. Where nothing is
+    /// [common](Self::common), no two are equal.
+    pub fn first(&self) -> Option<(u64, Rect)> {
+        let starts = self
+            .cells()
+            .filter_map(|(r, s)| Some((s.first()?.start, r)));
+        starts.min()
+    }
+
     /// What is still missing of `wanted` over `rect`: disjoint rectangles, each with sorted ranges.
     pub fn missing(&self, rect: Rect, wanted: Range<u64>) -> Vec<(Rect, Vec<Range<u64>>)> {
         let mut out = Vec::new();

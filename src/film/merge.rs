@@ -1,6 +1,6 @@
 //! Films added up: slices of samples, regions, or both.
 
-use super::coverage::Rect;
+use super::coverage::{Coverage, Rect};
 use super::{Film, fold};
 use std::fmt;
 use std::ops::Range;
@@ -34,6 +34,16 @@ pub enum MergeError {
     },
 }
 
+impl MergeError {
+    /// Refuses samples that would count twice.
+    pub fn overlap(into: &Coverage, other: &Coverage) -> Result<(), Self> {
+        match into.common(other) {
+            Some((rect, samples)) => Err(Self::Overlap { rect, samples }),
+            None => Ok(()),
+        }
+    }
+}
+
 /// `x0,y0,x1,y1`, as `--region` reads it.
 fn show(rect: &Rect) -> String {
     let Rect { x0, y0, x1, y1 } = rect;
@@ -59,13 +69,7 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
             other: other.strata,
         });
     }
-    for (rect, ranges) in other.coverage.cells() {
-        for samples in ranges {
-            if let Some((rect, samples)) = into.coverage.overlap(rect, samples) {
-                return Err(MergeError::Overlap { rect, samples });
-            }
-        }
-    }
+    MergeError::overlap(&into.coverage, &other.coverage)?;
     grow(into, into.bounds.union(&other.bounds));
     if into.partial.is_empty() && !other.partial.is_empty() {
         into.partial = vec![Default::default(); into.sums.len()];

@@ -19,7 +19,8 @@ use crate::output::error::{FileError, open};
 use crate::provenance::Provenance;
 use crate::scene::LARGEST_STRATA;
 use serde::{Deserialize, Serialize};
-use std::io::BufReader;
+use std::fs::File;
+use std::io::{BufReader, Read};
 use std::ops::Range;
 use std::path::Path;
 
@@ -109,8 +110,37 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
     atomic::replace(path, |file| npz::write(file, &arrays))
 }
 
+/// What a film's file says of it before its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outline {
+    /// The part of the picture that it holds.
+    pub bounds: Rect,
+    /// Which pixels have had which samples.
+    pub coverage: Coverage,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+/// Reads what is known without reading the film itself, which may be damaged still.
+pub fn outline(path: &Path) -> Result<Outline, FileError> {
+    let header = reading(path, |mut reader| read_header(&mut reader))?;
+    Ok(Outline {
+        bounds: header.bounds,
+        coverage: header.coverage,
+        provenance: header.provenance,
+    })
+}
+
 /// Loads a film. Whatever is wrong with the file is an error of its content, found before it can do harm.
 pub fn load(path: &Path) -> Result<(Film, Provenance), FileError> {
+    reading(path, read)
+}
+
+/// Opens a film's file for `read`, and tells the kinds of its failures apart.
+fn reading<T>(
+    path: &Path,
+    read: impl FnOnce(Reader<BufReader<File>>) -> Result<T, Damage>,
+) -> Result<T, FileError> {
     let file = open(path)?;
     let length = file
         .metadata()
@@ -127,7 +157,7 @@ pub fn load(path: &Path) -> Result<(Film, Provenance), FileError> {
     })
 }
 
-fn read<R: std::io::Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
+fn read_header<R: Read>(reader: &mut Reader<R>) -> Result<Header, Damage> {
     let wrong = |what: String| Err(Damage::Wrong(what));
     let json = reader.string("provenance")?;
     let not_json = |e: serde_json::Error| Damage::Wrong(format!("its provenance is wrong: {e}"));
@@ -143,7 +173,11 @@ fn read<R: std::io::Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), D
     }
     let header: Header = serde_json::from_slice(&json).map_err(not_json)?;
     check_header(&header).map_err(Damage::Wrong)?;
+    Ok(header)
+}
 
+fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
+    let header = read_header(&mut reader)?;
     let pixels = header.bounds.area();
     let [height, width] = [header.bounds.height(), header.bounds.width()].map(u64::from);
     let per_replicate = [height, width, REPLICATES as u64, 4];
@@ -151,12 +185,12 @@ fn read<R: std::io::Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), D
     // Only now is it known that the file is as large as the bounds say.
     let counts = counts(&header.coverage, header.bounds).map_err(Damage::Wrong)?;
     if let Some(i) = (0..counts.len()).find(|&i| counts[i] != stored[i]) {
-        return wrong(format!(
+        return Err(Damage::Wrong(format!(
             "pixel {} counts {} samples where its coverage has {}",
             pixel(header.bounds, i),
             stored[i] as i64,
             counts[i]
-        ));
+        )));
     }
     drop(stored);
     let sums: Vec<[Sums<f64>; REPLICATES]> = reader.array("sums", "<f8", &per_replicate, pixels)?;

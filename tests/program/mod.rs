@@ -57,6 +57,9 @@ radius   = 0.5
 radiance = [8.0, 8.0, 8.0]
 "#;
 
+/// Runs a command in a mount namespace of its own, for file systems that vanish with it.
+pub const NAMESPACE: &[&str] = &["unshare", "--map-root-user", "--mount"];
+
 /// A folder with `box.toml` in it, which is the working directory of every command.
 pub struct Bench {
     pub dir: TempDir,
@@ -93,6 +96,25 @@ impl Bench {
 
     pub fn film(&self, name: &str) -> Film {
         store::load(&self.path(name)).expect("a film of ours").0
+    }
+
+    /// Runs a shell script in the folder, in which `$0` is the program; returns its status. `wrapper` is a command that
+    /// runs another.
+    pub fn shell(&self, wrapper: &[&str], script: &str) -> i32 {
+        let said = fs::File::create(self.path("said")).expect("a file");
+        let sh = ["sh", "-c", script, env!("CARGO_BIN_EXE_etendue")];
+        let all: Vec<&str> = wrapper.iter().copied().chain(sh).collect();
+        let done = std::process::Command::new(all[0])
+            .args(&all[1..])
+            .current_dir(self.dir.path())
+            .stderr(said)
+            .status();
+        done.expect("it starts").code().expect("not killed")
+    }
+
+    /// What the last script wrote to stderr.
+    pub fn said(&self) -> String {
+        fs::read_to_string(self.path("said")).expect("text")
     }
 
     /// Names in the folder, sorted.

@@ -1,19 +1,14 @@
 //! What befalls long runs, to real processes: SIGKILL at any moment, a write that stalls, a full disk. The film on disk
 //! stays whole, and what comes after has the bits of a run that nothing befell.
 
-#![cfg(target_os = "linux")]
-
-mod output_support;
-mod program;
-
+use crate::output_support::Random;
+use crate::program::{Bench, NAMESPACE, SCENE, says};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
 use etendue::film::store;
 use etendue::provenance::Provenance;
 use etendue::scene::parse;
 use etendue::settings::{Overrides, Settings};
-use output_support::Random;
-use program::{Bench, SCENE, says};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -210,21 +205,6 @@ fn a_write_that_stalls_for_ever_costs_only_what_it_was_to_save() {
     assert!(leftovers(&bench).is_empty());
 }
 
-/// Runs a shell script in the bench's folder; `$0` is the program. Its output goes to `said`; returns its status.
-fn shell(bench: &Bench, wrapper: &[&str], script: &str) -> i32 {
-    let mut command = Command::new(wrapper.first().unwrap_or(&"sh"));
-    if wrapper.len() > 1 {
-        command.args(&wrapper[1..]).arg("sh");
-    }
-    let said = fs::File::create(bench.path("said")).expect("a file");
-    let done = command
-        .args(["-c", script, env!("CARGO_BIN_EXE_etendue")])
-        .current_dir(bench.dir.path())
-        .stderr(said)
-        .status();
-    done.expect("it starts").code().expect("not killed")
-}
-
 /// A film of 10 samples, and the command that goes on with it at `PATH`.
 fn small_film(bench: &Bench) -> Vec<u8> {
     bench.render("--spp 10 --film f.npz -o a.png");
@@ -238,8 +218,8 @@ fn a_limit_on_file_sizes_is_an_error_and_the_film_stays() {
     // The pictures are small enough, the film of 52 KiB is not.
     let script =
         "ulimit -f 40; \"$0\" render box.toml --backend cpu --spp 20 --film f.npz -o b.png";
-    assert_eq!(shell(&bench, &[], script), 4);
-    let said = fs::read_to_string(bench.path("said")).expect("text");
+    assert_eq!(bench.shell(&[], script), 4);
+    let said = bench.said();
     assert!(
         said.contains("error: f.npz: cannot write: file too large"),
         "{said}"
@@ -254,11 +234,10 @@ fn a_limit_on_file_sizes_is_an_error_and_the_film_stays() {
 fn a_full_disk_is_an_error_and_the_film_stays() {
     let bench = Bench::new();
     let before = small_film(&bench);
-    let namespace = ["unshare", "--map-root-user", "--mount"];
     let mount =
         "mkdir -p disk && mount -t tmpfs -o size=96k tmpfs disk || exit 77; cp f.npz disk/;";
-    if shell(&bench, &namespace, mount) != 0 {
-        let said = fs::read_to_string(bench.path("said")).unwrap_or_default();
+    if bench.shell(NAMESPACE, mount) != 0 {
+        let said = bench.said();
         eprintln!("SKIPPED, no tmpfs can be mounted here: {said}");
         return;
     }
@@ -266,8 +245,8 @@ fn a_full_disk_is_an_error_and_the_film_stays() {
     let script = format!(
         "{mount} {render} --spp 20 -o b.png; status=$?; cp disk/f.npz after; ls -A disk >&2; exit $status"
     );
-    assert_eq!(shell(&bench, &namespace, &script), 4);
-    let said = fs::read_to_string(bench.path("said")).expect("text");
+    assert_eq!(bench.shell(NAMESPACE, &script), 4);
+    let said = bench.said();
     assert!(
         said.contains("error: disk/f.npz: cannot write: no space left"),
         "{said}"
@@ -284,8 +263,8 @@ fn a_full_disk_is_an_error_and_the_film_stays() {
         "{mount} head -c 20k /dev/zero > disk/filler; (sleep 1; rm disk/filler; mount -o remount,size=1m disk) & \
          {render} --time 3s --checkpoint 200ms -o b.png; status=$?; cp disk/f.npz after; exit $status"
     );
-    assert_eq!(shell(&bench, &namespace, &script), 0);
-    let said = fs::read_to_string(bench.path("said")).expect("text");
+    assert_eq!(bench.shell(NAMESPACE, &script), 0);
+    let said = bench.said();
     assert!(
         said.contains("warning: disk/f.npz: cannot write: no space left"),
         "{said}"

@@ -1,0 +1,13 @@
+//! Films and the program, seen from outside.
+
+mod damage;
+#[cfg(target_os = "linux")]
+mod kill;
+mod merge;
+mod progress;
+mod resume;
+
+#[path = "../output_support/mod.rs"]
+mod output_support;
+#[path = "../program/mod.rs"]
+mod program;

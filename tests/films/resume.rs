@@ -1,0 +1,138 @@
+//! Going on with a film: what is refused, what is not, and what NumPy finds in it.
+
+use crate::output_support::seen_from_python;
+use crate::program::{Bench, SCENE, says};
+use etendue::film::store;
+use etendue::provenance::Provenance;
+use predicates::prelude::*;
+use serde_json::{Value, json};
+use std::fs;
+
+const GO_ON: &str = "render box.toml --backend cpu --spp 8 --film f.npz -o a.png";
+
+/// A film of 4 samples, made as if `edit` had been so.
+fn film_with(bench: &Bench, edit: impl Fn(&mut Provenance)) -> Vec<u8> {
+    let path = bench.path("f.npz");
+    let _ = fs::remove_file(&path);
+    bench.render("--spp 4 --film f.npz -o a.png");
+    let (film, mut provenance) = store::load(&path).expect("a film");
+    edit(&mut provenance);
+    store::save(&path, &film, &provenance).expect("saved");
+    fs::read(path).expect("the film")
+}
+
+#[test]
+fn a_version_that_samples_differently_is_refused_and_another_version_is_not() {
+    let bench = Bench::new();
+    let before = film_with(&bench, |p| {
+        p.sampler_version = 0;
+        p.version = "0.0.1".into();
+    });
+    bench
+        .run(GO_ON)
+        .code(2)
+        .stderr(says("f.npz").and(says("sampler is 0 (of version 0.0.1) and 1 (of version ")));
+    assert_eq!(fs::read(bench.path("f.npz")).expect("the film"), before);
+
+    film_with(&bench, |p| p.version = "0.0.1".into());
+    bench.run(GO_ON).success();
+}
+
+#[test]
+fn everything_that_differs_is_named() {
+    let bench = Bench::new();
+    let before = film_with(&bench, |_| {});
+    let other = SCENE
+        .replace("0.45", "0.46")
+        .replace("Test box", "Other box");
+    fs::write(bench.path("other.toml"), other).expect("a scene");
+    let go_on = |scene: &str, flags: &str| {
+        bench
+            .run(&format!(
+                "render {scene} --backend cpu --spp 8 --film f.npz {flags}"
+            ))
+            .code(2)
+    };
+    go_on("box.toml", "--shadow-rays 2 --strata 3 --seed 9").stderr(
+        says("strata is 2 and 3")
+            .and(says("shadow_rays is 1 and 2"))
+            .and(says("seed is 0 and 9")),
+    );
+    go_on("other.toml", "")
+        .stderr(says("scene is \"Test box\" (").and(says("and \"Other box\" (")));
+    assert_eq!(fs::read(bench.path("f.npz")).expect("the film"), before);
+}
+
+#[test]
+fn another_adapter_goes_on_with_a_note() {
+    let bench = Bench::new();
+    film_with(&bench, |p| {
+        p.devices[0].device.name = "Another adapter".into()
+    });
+    let text = "note: f.npz holds samples made on Another adapter";
+    bench.run(GO_ON).success().stderr(says(text));
+    let (film, provenance) = store::load(&bench.path("f.npz")).expect("a film");
+    assert_eq!(film.coverage.samples(), (8, 8));
+    let used: Vec<_> = provenance
+        .devices
+        .iter()
+        .map(|d| (d.device.name.as_str(), d.samples))
+        .collect();
+    assert_eq!(
+        used,
+        [
+            ("Another adapter", 4 * 24 * 16),
+            ("CPU reference (f64)", 4 * 24 * 16)
+        ]
+    );
+    // Another number of threads is not another adapter.
+    film_with(&bench, |_| {});
+    bench
+        .run(&format!("{GO_ON} --threads 3"))
+        .success()
+        .stderr(says("note: f.npz").not());
+}
+
+#[test]
+fn numpy_finds_what_is_promised() {
+    let bench = Bench::new();
+    bench.render("--size 12x8 --spp 300 --seed 5 --film f.npz -o a.exr");
+    let Some(seen) = seen_from_python(&bench.path("f.npz")) else {
+        return;
+    };
+    let arrays = &seen["arrays"];
+    let types = |name: &str| (arrays[name]["dtype"].clone(), arrays[name]["shape"].clone());
+    assert_eq!(types("sums"), (json!("<f8"), json!([8, 12, 4, 4])));
+    assert_eq!(types("counts"), (json!("<u8"), json!([8, 12])));
+
+    // The formula that the documentation gives, against the picture.
+    let number = |v: &Value| v.as_f64().expect("a number");
+    let picture = bench.picture("a.exr");
+    for y in 0..8 {
+        for x in 0..12 {
+            let count = number(&arrays["counts"]["values"][y][x]);
+            assert_eq!(count, 300.0);
+            for c in 0..3 {
+                let replicate = |r: usize| number(&arrays["sums"]["values"][y][x][r][c]);
+                let mean = (0..4).map(replicate).sum::<f64>() / count;
+                let pixel = f64::from(picture.rgb[y * 12 + x][c]);
+                assert!(
+                    (mean - pixel).abs() <= 1e-6 * pixel,
+                    "{x}, {y}: {mean} {pixel}"
+                );
+            }
+        }
+    }
+
+    let told = &seen["provenance"]["provenance"];
+    assert_eq!(told["scene_text"], SCENE);
+    assert_eq!(told["scene_hash"].as_str().map(str::len), Some(64));
+    assert_eq!(told["settings"]["seed"], 5);
+    assert_eq!(told["samples"], 300);
+    assert_eq!(told["version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(told["devices"][0]["device"]["name"], "CPU reference (f64)");
+    assert_eq!(told["devices"][0]["samples"], 300 * 96);
+    for seconds in [&told["seconds"], &told["devices"][0]["seconds"]] {
+        assert!(number(seconds) > 0.0);
+    }
+}
