@@ -67,7 +67,7 @@ fn everything_that_differs_is_named() {
 fn another_adapter_goes_on_with_a_note() {
     let bench = Bench::new();
     film_with(&bench, |p| {
-        p.devices[0].device.name = "Another adapter".into()
+        p.devices[0].device.name = "Another adapter".into();
     });
     let text = "note: f.npz holds samples made on Another adapter";
     bench.run(GO_ON).success().stderr(says(text));
