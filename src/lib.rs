@@ -8,6 +8,7 @@
 //! The CPU [`reference`] takes the same [`world::World`] and gives the same [`film::Film`].
 
 pub mod cli;
+pub mod compare;
 pub mod engine;
 pub mod film;
 pub mod gpu;

@@ -1,6 +1,7 @@
 //! The command line as clap reads it.
 
 use super::values;
+use crate::compare::DEFAULT_ALPHA;
 use crate::film::BLOCK;
 use crate::film::coverage::Rect;
 use crate::settings::{Integrator, LightParts, Overrides};
@@ -19,7 +20,7 @@ Examples:
   etendue adapters
   etendue selftest
 
-Exit status: 0 done, 1 a self-test failed, 2 bad command line or input, 3 no adapter or it failed, 4 a file can't be read or
+Exit status: 0 done, passed or the same, 1 failed or different, 2 bad command line or input, 3 no adapter or it failed, 4 a file can't be read or
 written, 130 or 143 interrupted after saving what there is.")]
 pub struct Cli {
     /// What to do.
@@ -40,6 +41,8 @@ pub enum Command {
     Merge(MergeArgs),
     /// Run the hard cases, whose answers are known, on this adapter
     Selftest(SelftestArgs),
+    /// Say whether two pictures are the same up to their noise
+    Compare(CompareArgs),
     /// List the adapters, which one would be taken, and why not the others
     Adapters,
     /// Print the JSON Schema of scene files
@@ -294,4 +297,36 @@ pub struct SelftestArgs {
     /// How much to say.
     #[command(flatten)]
     pub talk: Talk,
+}
+
+/// `etendue compare`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Pictures with error layers (EXR files and films that etendue made) need no threshold: --alpha is the rate at which
+pictures of the same scene are called different. Others are held against the limits that you give; noise then counts
+as a difference.
+
+Examples:
+  etendue compare before.exr after.exr
+  etendue compare before.exr after.npz --html report.html
+  etendue compare before.png after.png --max-flip 0.05
+
+Exit status: 0 the same, 1 different, 2 not comparable.")]
+pub struct CompareArgs {
+    /// The reference: .exr, .npz (a film) or .png
+    pub a: PathBuf,
+    /// What is held against it
+    pub b: PathBuf,
+    /// False-alarm rate over the whole picture
+    #[arg(long, value_name = "P", default_value_t = DEFAULT_ALPHA, value_parser = values::probability)]
+    pub alpha: f64,
+    /// The most that the mean FLIP may be, 0 to 1
+    #[arg(long, value_name = "X", value_parser = values::limit)]
+    pub max_flip: Option<f64>,
+    /// The most that the relative RMSE may be: 0.02 or 2%
+    #[arg(long, value_name = "X", value_parser = values::limit)]
+    pub max_relative_rmse: Option<f64>,
+    /// Write one page with both pictures, their difference and all numbers
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
 }

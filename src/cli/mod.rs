@@ -4,6 +4,7 @@ mod adapters;
 mod args;
 mod backend;
 mod check;
+mod compare;
 mod develop;
 mod failure;
 mod memory;
@@ -53,6 +54,7 @@ pub fn main() -> ExitCode {
         Command::Develop(args) => develop::develop(&args),
         Command::Merge(args) => merge::merge(&args),
         Command::Selftest(args) => selftest::selftest(&args),
+        Command::Compare(args) => compare::compare(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
     };

@@ -65,6 +65,26 @@ pub fn relative_error(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A probability: more than 0, less than 1.
+pub fn probability(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(p) if p > 0.0 && p < 1.0 => Ok(p),
+        _ => Err("expected a probability, more than 0 and less than 1".into()),
+    }
+}
+
+/// A limit on a metric, 0 or more: `0.02` or `2%`.
+pub fn limit(text: &str) -> Result<f64, String> {
+    let (number, scale) = match text.strip_suffix('%') {
+        Some(number) => (number, 0.01),
+        None => (text, 1.0),
+    };
+    match number.trim().parse::<f64>() {
+        Ok(x) if x >= 0.0 && x.is_finite() => Ok(x * scale),
+        _ => Err("expected a number such as 0.02 or 2%, 0 or more".into()),
+    }
+}
+
 /// The most samples that a pixel can have: they are numbered in 32 bits.
 pub const MAX_SAMPLES: u64 = u32::MAX as u64;
 

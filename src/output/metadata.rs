@@ -10,6 +10,15 @@ pub enum Value {
     Number(f64),
 }
 
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Text(text) => f.write_str(text),
+            Self::Number(x) => x.fmt(f),
+        }
+    }
+}
+
 /// Keys and values, in a fixed order. What is not known, a title or a relative error, is left out.
 pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
     let text = |s: &str| Some(Value::Text(s.into()));

@@ -12,6 +12,8 @@ pub mod report;
 pub use error::FileError;
 pub use exr::write_exr;
 pub use exr_read::{Picture, read_exr};
+pub(crate) use metadata::entries;
+pub(crate) use pixels::Pixels;
 pub use png::write_png;
 pub use report::Report;
 

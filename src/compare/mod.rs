@@ -1,0 +1,176 @@
+//! Are two pictures the same up to their noise?
+//!
+//! Pictures that state their noise get a [`Verdict`]: no threshold but the rate of false alarms. Others are
+//! held against limits that the user gives, on [`Metrics`] that cannot tell noise from a difference.
+
+pub mod flip;
+mod grid;
+pub mod html;
+pub mod metrics;
+mod picture;
+mod text;
+pub mod verdict;
+
+pub use metrics::Metrics;
+pub use picture::{Noise, Picture};
+pub use verdict::Verdict;
+
+/// The rate of false alarms over the whole picture, unless another is asked for.
+pub const DEFAULT_ALPHA: f64 = 0.001;
+
+/// What is asked of two pictures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// False-alarm rate of the verdict over the whole picture.
+    pub alpha: f64,
+    /// The most that the mean FLIP may be.
+    pub max_flip: Option<f64>,
+    /// The most that [`Metrics::relative_rmse`] may be.
+    pub max_relative_rmse: Option<f64>,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            alpha: DEFAULT_ALPHA,
+            max_flip: None,
+            max_relative_rmse: None,
+        }
+    }
+}
+
+/// What a comparison found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// Distances, noise included.
+    pub metrics: Metrics,
+    /// What the noise leaves of them, if both pictures state theirs.
+    pub verdict: Option<Verdict>,
+    /// Limits that are exceeded, in words.
+    pub exceeded: Vec<String>,
+    /// What the user should know about the pair.
+    pub notes: Vec<String>,
+    /// Whether every pixel is the same to the bit.
+    pub identical: bool,
+}
+
+/// Why two pictures can't be compared.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Incomparable {
+    /// Their sizes differ.
+    #[error("{a} has {} x {} pixels, {b} has {} x {}", .sizes[0][0], .sizes[0][1], .sizes[1][0], .sizes[1][1])]
+    Size {
+        /// Name of A.
+        a: String,
+        /// Name of B.
+        b: String,
+        /// Width and height of both.
+        sizes: [[u32; 2]; 2],
+    },
+    /// Their pixels without samples are not the same.
+    #[error(
+        "pixel ({x}, {y}) has samples in {with} and none in {without}; compare pictures of the same regions"
+    )]
+    Regions {
+        /// Column.
+        x: u32,
+        /// Row.
+        y: u32,
+        /// Name of the picture that has it.
+        with: String,
+        /// Name of the other.
+        without: String,
+    },
+    /// No verdict is possible, and there are no limits.
+    #[error(
+        "{name} does not state its noise (it lacks error layers, samples, or two independent replicates), so only \
+         limits can decide: give --max-flip or --max-relative-rmse"
+    )]
+    NoNoise {
+        /// The picture without error layers.
+        name: String,
+    },
+}
+
+/// Compares two pictures; A is the reference where the order matters.
+pub fn compare(a: &Picture, b: &Picture, limits: &Limits) -> Result<Comparison, Incomparable> {
+    check(a, b)?;
+    let limited = limits.max_flip.is_some() || limits.max_relative_rmse.is_some();
+    let silent = [a, b].into_iter().find(|p| p.noise.is_none());
+    let verdict = match silent {
+        None => Some(verdict::verdict(a, b, limits.alpha)),
+        Some(_) if limited => None,
+        Some(picture) => {
+            return Err(Incomparable::NoNoise {
+                name: picture.name.clone(),
+            });
+        }
+    };
+    let metrics = Metrics::new(a, b);
+    let over = |what: &str, value: f64, limit: Option<f64>| {
+        // Not "value > limit": a value that is not a number exceeds every limit.
+        let limit = limit.filter(|limit| !(value <= *limit))?;
+        Some(format!("{what} is {value:.4}, the limit {limit}"))
+    };
+    let exceeded = [
+        over("mean FLIP", metrics.flip, limits.max_flip),
+        over(
+            "relative RMSE",
+            metrics.relative_rmse(),
+            limits.max_relative_rmse,
+        ),
+    ];
+    Ok(Comparison {
+        metrics,
+        verdict,
+        exceeded: exceeded.into_iter().flatten().collect(),
+        notes: notes(a, b),
+        identical: a.rgb == b.rgb,
+    })
+}
+
+fn check(a: &Picture, b: &Picture) -> Result<(), Incomparable> {
+    if a.size != b.size {
+        return Err(Incomparable::Size {
+            a: a.name.clone(),
+            b: b.name.clone(),
+            sizes: [a.size, b.size],
+        });
+    }
+    if let Some(i) = (0..a.covered.len()).find(|&i| a.covered[i] != b.covered[i]) {
+        let (with, without) = if a.covered[i] { (a, b) } else { (b, a) };
+        return Err(Incomparable::Regions {
+            x: i as u32 % a.size[0],
+            y: i as u32 / a.size[0],
+            with: with.name.clone(),
+            without: without.name.clone(),
+        });
+    }
+    Ok(())
+}
+
+fn notes(a: &Picture, b: &Picture) -> Vec<String> {
+    let both = |key: &str| Some((a.origin(key)?, b.origin(key)?));
+    let mut notes = Vec::new();
+    if let Some((x, y)) = both("scene_hash")
+        && x != y
+    {
+        notes.push("the pictures are of different scenes or settings, by their hashes".into());
+    }
+    if let Some((x, y)) = both("seed")
+        && x == y
+    {
+        notes.push(format!(
+            "both were made with seed {x}: what one has missed by chance the other has missed too; render one with \
+             another --seed"
+        ));
+    }
+    notes
+}
+
+impl Comparison {
+    /// Whether nothing speaks against the pictures being the same.
+    pub fn same(&self) -> bool {
+        self.exceeded.is_empty() && self.verdict.as_ref().is_none_or(Verdict::same)
+    }
+}

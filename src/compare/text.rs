@@ -1,0 +1,140 @@
+//! A comparison in words.
+
+use super::verdict::{Finding, Sensitivity, Verdict};
+use super::{Comparison, Metrics};
+use std::fmt::Write as _;
+
+pub(super) const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+impl Comparison {
+    /// The verdict in one sentence.
+    pub fn sentence(&self) -> String {
+        let mut text = match &self.verdict {
+            Some(v) if self.identical && v.same() => "the same to the bit".into(),
+            Some(v) => verdict_sentence(v),
+            None if self.same() => {
+                "within the limits (the pictures do not state their noise, so this is no statistical verdict)".into()
+            }
+            None => String::new(),
+        };
+        for what in &self.exceeded {
+            if !text.is_empty() {
+                text += "; ";
+            }
+            let _ = write!(text, "different: {what}");
+        }
+        text
+    }
+
+    /// The sentence, where the difference is, the metrics, and notes: lines of text.
+    pub fn report(&self) -> String {
+        let mut text = self.sentence() + "\n";
+        if let Some(v) = &self.verdict {
+            if !v.findings.is_empty() {
+                text += "\n  where                          channel        A        B    change       z\n";
+            }
+            for f in &v.findings {
+                let _ = writeln!(text, "  {}", finding(f));
+            }
+        }
+        text += "\n";
+        text += &metrics(&self.metrics);
+        for note in &self.notes {
+            let _ = write!(text, "\nnote: {note}\n");
+        }
+        text
+    }
+}
+
+fn verdict_sentence(v: &Verdict) -> String {
+    let alpha = v.alpha;
+    if v.same() {
+        let mut text = format!("the same up to their noise (false alarms: {alpha})");
+        let told: Vec<String> = v.sensitivity.iter().filter_map(seen).take(3).collect();
+        match told.split_last() {
+            Some((last, [])) => text += &format!("; {last} would have been seen"),
+            Some((last, rest)) => {
+                text += &format!("; {} or {last} would have been seen", rest.join(", "));
+            }
+            None => text += "; but so noisy that hardly any change would have been seen",
+        }
+        text
+    } else {
+        let p = if v.p < 1e-15 {
+            "below 1e-15".into()
+        } else {
+            format!("{:.0e}", v.p)
+        };
+        let worst = v.findings.first().map(place).unwrap_or_default();
+        format!(
+            "different, most certainly {worst}: equal pictures look so with probability {p} (limit {alpha})"
+        )
+    }
+}
+
+/// What would have been seen, in words; nothing for blocks of which half could double in brightness unseen.
+fn seen(s: &Sensitivity) -> Option<String> {
+    let change = percent(Some(s.change).filter(|c| *c < 1.0)?);
+    Some(match s.side {
+        0 => format!("a change of all light by {change}"),
+        side => format!("of {side}x{side} pixels by {change}"),
+    })
+}
+
+pub(super) fn place(f: &Finding) -> String {
+    let r = &f.rect;
+    match (r.width(), r.height()) {
+        (1, 1) => format!("at pixel ({}, {})", r.x0, r.y0),
+        (w, h) => format!("in {w}x{h} pixels at ({}, {})", r.x0, r.y0),
+    }
+}
+
+fn finding(f: &Finding) -> String {
+    let [a, b] = f.means;
+    let change = change(a, b);
+    format!(
+        "{:<30} {:<7} {a:>8.4} {b:>8.4} {change:>9} {:>7.1}",
+        place(f),
+        CHANNELS[f.channel],
+        f.z
+    )
+}
+
+pub(super) fn change(a: f64, b: f64) -> String {
+    if a == 0.0 {
+        "-".into()
+    } else {
+        format!("{:+.2} %", 100.0 * (b - a) / a)
+    }
+}
+
+/// Names and values of the metrics.
+pub(super) fn metric_values(m: &Metrics) -> [(&'static str, String); 6] {
+    let rgb = |c: [f64; 3]| format!("{:.5} {:.5} {:.5}", c[0], c[1], c[2]);
+    [
+        ("mean of A", rgb(m.means[0])),
+        ("mean of B", rgb(m.means[1])),
+        ("RMSE", format!("{:.5}", m.rmse)),
+        ("relative RMSE", percent(m.relative_rmse())),
+        ("PSNR", format!("{:.2} dB", m.psnr)),
+        ("mean FLIP", format!("{:.4}", m.flip)),
+    ]
+}
+
+fn metrics(m: &Metrics) -> String {
+    let line = |(key, value)| format!("  {key:<16} {value}\n");
+    metric_values(m).into_iter().map(line).collect()
+}
+
+/// With three digits that count.
+pub(super) fn percent(x: f64) -> String {
+    let p = 100.0 * x;
+    let digits = if p >= 10.0 {
+        0
+    } else if p >= 1.0 {
+        1
+    } else {
+        2
+    };
+    format!("{p:.digits$} %")
+}

@@ -1,0 +1,288 @@
+//! Whether two pictures differ by more than their noise.
+//!
+//! Blocks of pixels of every dyadic side, from one pixel to the whole picture, are tested in each channel. Let
+//! d be the difference of the two pictures in a pixel and v its variance as the pictures state it. A sample that
+//! is rare and bright (a caustic) makes v a poor witness: where it was missed, v is too small; where it was met
+//! equally often in every replicate, v is nearly 0. So no test leans on v alone.
+//!
+//! *Large blocks*, [`SIGNED_SIDE`] pixels a side or more. Of two pictures of one scene with equal samples,
+//! the signs of the d are independent fair coins whatever the noise. Given their sizes, Σ d / √Σ d² then has tails at
+//! most [`BENTKUS`] times those of the normal distribution [Bentkus2015], for any number of pixels and any
+//! tails of the noise. The denominator is never less than √Σ v, which matters for unequal samples: a dim side
+//! that missed what the other met. Every such block is tested twice, as it is ([`Kind::Mean`]) and with each
+//! pixel divided by the noise of the pixels around it ([`Kind::Standardised`]), which leaves the coins fair, for
+//! that noise contains neither the pixel's value nor its sign. The second sees a change beside a caustic.
+//!
+//! *Small blocks* have too few coins for small probabilities. There two witnesses must agree: Welch's t with a
+//! variance that is the larger of the block's own and the mean around it, its degrees of freedom after
+//! Satterthwaite over both; and Welch's t with the block's own variance alone. The second may be as weak as
+//! the square root of what the first says, because eight replicates cannot say more.
+//!
+//! Every scale and kind has the same share of the false-alarm rate, and within it every block and channel
+//! (Bonferroni). That no sample of a bright path was met in either picture, no test can know.
+
+use super::grid::{Grid, Terms};
+use super::picture::Picture;
+use crate::film::coverage::Rect;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::function::erf::{erfc, erfc_inv};
+use std::f64::consts::SQRT_2;
+
+/// Side of the smallest blocks that are tested by their signs: 64 coins.
+pub const SIGNED_SIDE: u32 = 8;
+
+/// Tails of a sum of coins of any sizes are at most this much heavier than the normal distribution's: 1/(4 Φc(√2)).
+pub const BENTKUS: f64 = 3.178_5;
+
+/// Means that differ by no more than this share are equal: f32 sums of a block of samples round so.
+pub(super) const ROUNDING: f64 = 2e-6;
+
+/// Findings that are kept.
+const MOST_FINDINGS: usize = 8;
+
+/// What a test is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Welch's t of a small block.
+    Small,
+    /// Signs, weighing pixels equally.
+    Mean,
+    /// Signs, weighing pixels by the noise around them.
+    Standardised,
+}
+
+/// A block that differs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Its pixels.
+    pub rect: Rect,
+    /// 0, 1, 2: red, green, blue.
+    pub channel: usize,
+    /// Which test found it.
+    pub kind: Kind,
+    /// The probability that one of all tests says so of equal pictures.
+    pub p: f64,
+    /// (B - A) over its standard error, as tested.
+    pub z: f64,
+    /// Mean of the channel over the block in A and B.
+    pub means: [f64; 2],
+    /// Standard error of the difference of those means, as the pictures state it.
+    pub error: f64,
+}
+
+/// The smallest change that the tests would have seen with probability [`POWER`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sensitivity {
+    /// Side of the block; 0 for the whole picture.
+    pub side: u32,
+    /// Relative change of all light in the block, the median over blocks; infinite where none would do.
+    pub change: f64,
+}
+
+/// The probability that [`Sensitivity`] speaks of.
+pub const POWER: f64 = 0.95;
+
+/// Standard normal quantile of [`POWER`].
+const POWER_QUANTILE: f64 = 1.644_854;
+
+/// What the tests say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// The false-alarm rate over the whole picture.
+    pub alpha: f64,
+    /// The probability that pictures of the same scene differ as much somewhere; an upper bound.
+    pub p: f64,
+    /// Tests made.
+    pub tests: usize,
+    /// What differs, most certain first, at most eight disjoint blocks and the whole picture.
+    pub findings: Vec<Finding>,
+    /// What would have been seen, from the whole picture to the smallest blocks.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+impl Verdict {
+    /// Whether nothing differs by more than the noise.
+    pub fn same(&self) -> bool {
+        self.p >= self.alpha
+    }
+}
+
+/// Tests two pictures of the same size, covered in the same pixels, which both state their noise.
+pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
+    let channels: Vec<Terms> = (0..3).map(|c| Terms::new(a, b, c)).collect();
+    let sides = sides(a.size);
+    let families: usize = sides.iter().map(|&side| kinds(side).len()).sum();
+    let mut all = Vec::new();
+    let mut sensitivity = Vec::new();
+    let mut tests = 0;
+    for &side in sides.iter().rev() {
+        let mut seen: Vec<f64> = Vec::new();
+        for &kind in kinds(side) {
+            let grids = channels.iter().map(|t| t.grid(side, kind));
+            let grids: Vec<Grid> = grids.collect();
+            let count: usize = grids.iter().map(|g| g.blocks.len()).sum();
+            tests += count;
+            let share = (count * families) as f64;
+            for (channel, grid) in grids.iter().enumerate() {
+                let found = grid.blocks.iter().filter_map(|block| {
+                    let (p, z) = test(kind, block);
+                    let p = (p * share).min(1.0);
+                    Some((p, z, block)).filter(|_| p < 1.0)
+                });
+                all.extend(found.map(|(p, z, block)| Finding {
+                    rect: block.rect,
+                    channel,
+                    kind,
+                    p,
+                    z,
+                    means: block.means,
+                    error: block.error,
+                }));
+            }
+            if kind != Kind::Small {
+                let needed = threshold(alpha / share) + POWER_QUANTILE;
+                changes(&mut seen, &grids, needed);
+            }
+        }
+        if !seen.is_empty() {
+            let middle = seen.len() / 2;
+            let (_, median, _) = seen.select_nth_unstable_by(middle, f64::total_cmp);
+            sensitivity.push(Sensitivity {
+                side: if sensitivity.is_empty() { 0 } else { side },
+                change: *median,
+            });
+        }
+    }
+    all.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.z.abs().total_cmp(&a.z.abs())));
+    Verdict {
+        alpha,
+        p: all.first().map_or(1.0, |f| f.p),
+        tests,
+        findings: pick(all, alpha, a.size),
+        sensitivity,
+    }
+}
+
+/// Every pixel's difference in luminance over its noise, B less A: for maps and histograms.
+pub(super) fn scores(a: &Picture, b: &Picture) -> Vec<f64> {
+    Terms::new(a, b, 3).scores()
+}
+
+/// Sides of blocks: powers of two, the last one as wide as the picture or wider.
+fn sides(size: [u32; 2]) -> Vec<u32> {
+    let longest = size[0].max(size[1]);
+    let mut sides = vec![1];
+    while sides[sides.len() - 1] < longest {
+        sides.push(2 * sides[sides.len() - 1]);
+    }
+    sides
+}
+
+fn kinds(side: u32) -> &'static [Kind] {
+    if side < SIGNED_SIDE {
+        &[Kind::Small]
+    } else {
+        &[Kind::Mean, Kind::Standardised]
+    }
+}
+
+/// Sums over a block of pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Block {
+    pub rect: Rect,
+    /// Pixels.
+    pub count: f64,
+    /// Σ d, weighed as the kind of test wants.
+    pub difference: f64,
+    /// Σ d², likewise.
+    pub squares: f64,
+    /// Σ v, likewise.
+    pub variance: f64,
+    /// The mean of v around, times the pixels.
+    pub around: f64,
+    /// Σ of the mean of both pictures, weighed.
+    pub light: f64,
+    /// Degrees of freedom of `variance` and of what is around it too.
+    pub dof: [f64; 2],
+    /// Unweighed means in A and B.
+    pub means: [f64; 2],
+    /// Standard error of their difference.
+    pub error: f64,
+}
+
+/// Probability of so much or more if there is no difference (two-sided, not corrected), and the signed statistic.
+fn test(kind: Kind, block: &Block) -> (f64, f64) {
+    let d = block.difference;
+    if d == 0.0 {
+        return (1.0, 0.0);
+    }
+    let rounding = (ROUNDING * block.light).powi(2);
+    let over = |variance: f64| d / (variance + rounding).sqrt();
+    if kind != Kind::Small {
+        let z = over(block.variance.max(block.squares));
+        return ((BENTKUS * two_sided_normal(z)).min(1.0), z);
+    }
+    let pooled = over(block.variance.max(block.around));
+    let own = two_sided_t(over(block.variance), block.dof[0]);
+    (two_sided_t(pooled, block.dof[1]).max(own * own), pooled)
+}
+
+fn two_sided_normal(z: f64) -> f64 {
+    erfc(z.abs() / SQRT_2)
+}
+
+/// Two-sided p-value of Student's t.
+pub fn two_sided_t(t: f64, dof: f64) -> f64 {
+    match StudentsT::new(0.0, 1.0, dof) {
+        Ok(dist) if t.is_finite() => 2.0 * dist.cdf(-t.abs()),
+        _ => 0.0,
+    }
+}
+
+/// The statistic of a large block whose p-value is `p`.
+fn threshold(p: f64) -> f64 {
+    SQRT_2 * erfc_inv((p / BENTKUS).min(1.0))
+}
+
+/// For each block the smallest relative change of all its light that brings the statistic of some channel to
+/// `needed`. A change adds to Σ d² too: of n pixels no statistic exceeds √n.
+fn changes(seen: &mut Vec<f64>, grids: &[Grid], needed: f64) {
+    let of = |block: &Block| {
+        let room = 1.0 - needed * needed / block.count;
+        if room > 0.0 && block.light > 0.0 {
+            needed * (block.variance / room).sqrt() / block.light
+        } else {
+            f64::INFINITY
+        }
+    };
+    for k in 0..grids[0].blocks.len() {
+        let least = grids
+            .iter()
+            .map(|g| of(&g.blocks[k]))
+            .fold(f64::INFINITY, f64::min);
+        // The first kind has been here when the second comes.
+        match seen.get_mut(k) {
+            Some(have) => *have = have.min(least),
+            None => seen.push(least),
+        }
+    }
+}
+
+/// The findings worth telling: what is certain enough, and of overlapping blocks the most certain one.
+fn pick(all: Vec<Finding>, alpha: f64, size: [u32; 2]) -> Vec<Finding> {
+    let mut kept: Vec<Finding> = Vec::new();
+    let whole = Rect::whole(size);
+    for finding in all {
+        if finding.p >= alpha || kept.len() == MOST_FINDINGS {
+            break;
+        }
+        let told = |k: &Finding| {
+            let same_part = (k.rect == whole) == (finding.rect == whole);
+            same_part && k.rect.intersection(&finding.rect).is_some()
+        };
+        if !kept.iter().any(told) {
+            kept.push(finding);
+        }
+    }
+    kept
+}
