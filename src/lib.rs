@@ -16,6 +16,7 @@ pub mod kernel;
 pub mod output;
 pub mod provenance;
 pub mod reference;
+pub mod regress;
 pub mod run;
 pub mod scene;
 pub mod selftest;

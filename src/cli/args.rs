@@ -43,6 +43,8 @@ pub enum Command {
     Selftest(SelftestArgs),
     /// Say whether two pictures are the same up to their noise
     Compare(CompareArgs),
+    /// Render every scene of a folder and compare it with its golden picture
+    Regress(RegressArgs),
     /// List the adapters, which one would be taken, and why not the others
     Adapters,
     /// Print the JSON Schema of scene files
@@ -329,4 +331,64 @@ pub struct CompareArgs {
     /// Write one page with both pictures, their difference and all numbers
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+}
+
+/// `etendue regress`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+DIR/NAME.toml is rendered with the settings and samples of DIR/golden/NAME.exr, but another seed, and compared as
+`etendue compare` does. What differs leaves golden/NAME.actual.npz and golden/NAME.report.html.
+
+Examples:
+  etendue regress scenes --bless
+  etendue regress scenes --junit results.xml --html results.html
+  etendue regress scenes --filter glass
+
+Exit status: 0 all passed; 1 one failed, has no golden, or no scene; 2 one can't be compared (a scene with errors, a
+damaged golden, one of another scene), or there is nothing to compare.")]
+pub struct RegressArgs {
+    /// The folder with the scenes
+    pub dir: PathBuf,
+    /// Make the goldens anew
+    #[arg(long)]
+    pub bless: bool,
+    /// Only what has TEXT in its name
+    #[arg(long, value_name = "TEXT")]
+    pub filter: Option<String>,
+    /// Scenes at a time
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub jobs: u16,
+    /// False-alarm rate over each picture
+    #[arg(long, value_name = "P", default_value_t = DEFAULT_ALPHA, value_parser = values::probability)]
+    pub alpha: f64,
+    /// Write the results as JUnit XML
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Write a page with all results
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Say nothing before the list at the end
+    #[arg(long)]
+    pub quiet: bool,
+
+    /// Change of all light that is to be seen with 95 % probability; decides the samples
+    #[arg(long, value_name = "X", default_value = "1%", value_parser = values::relative_error,
+          help_heading = "With --bless")]
+    pub power: f64,
+    /// The most samples a pixel
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = values::samples, help_heading = "With --bless")]
+    pub max_spp: u64,
+    /// Width and height in pixels [default: the scene's, made 64 wide]
+    #[arg(long, value_name = "WxH", value_parser = values::size, help_heading = "With --bless")]
+    pub size: Option<[u32; 2]>,
+
+    /// What renders: any adapter (gpu), the f64 reference (cpu), or the best there is (auto)
+    #[arg(long, value_enum, default_value_t = Backend::Auto, value_name = "NAME", help_heading = "What with")]
+    pub backend: Backend,
+    /// The adapter whose name contains NAME, in any case
+    #[arg(long, value_name = "NAME", help_heading = "What with")]
+    pub adapter: Option<String>,
+    /// Threads of the CPU reference; default one for each core
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096), help_heading = "What with")]
+    pub threads: Option<u16>,
 }

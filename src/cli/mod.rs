@@ -11,6 +11,7 @@ mod memory;
 mod merge;
 mod plan;
 mod progress;
+mod regress;
 mod render;
 mod saver;
 mod schema;
@@ -55,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Merge(args) => merge::merge(&args),
         Command::Selftest(args) => selftest::selftest(&args),
         Command::Compare(args) => compare::compare(&args),
+        Command::Regress(args) => regress::regress(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
     };

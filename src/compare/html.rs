@@ -41,7 +41,6 @@ pub fn page(a: &Picture, b: &Picture, comparison: &Comparison) -> String {
         .map(|(p, q)| (0..3).map(|c| q[c] - p[c]).sum::<f64>() / 3.0)
         .collect();
     let range = quantile(&differences, 0.99);
-    let shown = |p: &Picture| uri(p.size, p.rgb.iter().map(|v| v.map(encode_srgb)));
     let signed = |values: &[f64], range: f64| {
         uri(
             a.size,
@@ -89,11 +88,11 @@ pub fn page(a: &Picture, b: &Picture, comparison: &Comparison) -> String {
                 })
                 .into(),
         ),
-        ("a", shown(a)),
-        ("b", shown(b)),
+        ("a", picture_uri(a)),
+        ("b", picture_uri(b)),
         ("width", a.size[0].to_string()),
         ("height", a.size[1].to_string()),
-        ("boxes", boxes(comparison, a.size)),
+        ("boxes", boxes(comparison)),
         ("name_a", escape(&a.name)),
         ("name_b", escape(&b.name)),
         ("diverging", gradient(&DIVERGING)),
@@ -138,6 +137,11 @@ pub(crate) fn fill(template: &str, values: &[(&str, String)]) -> String {
         }
     }
     out
+}
+
+/// A picture as a PNG would show it, as a data URI.
+pub(crate) fn picture_uri(picture: &Picture) -> String {
+    uri(picture.size, picture.rgb.iter().map(|v| v.map(encode_srgb)))
 }
 
 /// Text for element content and quoted attributes.
@@ -205,11 +209,11 @@ fn uri(size: [u32; 2], pixels: impl Iterator<Item = [f64; 3]>) -> String {
     format!("data:image/png;base64,{}", STANDARD.encode(bytes))
 }
 
-fn boxes(comparison: &Comparison, size: [u32; 2]) -> String {
+fn boxes(comparison: &Comparison) -> String {
     let mut s = String::new();
     for f in comparison.verdict.iter().flat_map(|v| &v.findings) {
         let r = f.rect;
-        if [r.width(), r.height()] != size {
+        if !f.whole {
             let _ = write!(
                 s,
                 "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\"/>",
@@ -363,8 +367,9 @@ fn histogram(values: &[f64], range: f64, normal: bool) -> String {
     ] {
         let _ = write!(
             s,
-            "<text x=\"{x}\" y=\"{}\" text-anchor=\"{anchor}\">{value:.3}</text>",
-            base + 14.0
+            "<text x=\"{x}\" y=\"{}\" text-anchor=\"{anchor}\">{}</text>",
+            base + 14.0,
+            tick(value)
         );
     }
     let caption = if normal {
@@ -373,4 +378,16 @@ fn histogram(values: &[f64], range: f64, normal: bool) -> String {
         "counts on a logarithmic scale"
     };
     s + "</svg><p class=\"soft\">Pixels, " + caption + ".</p>"
+}
+
+/// A number with three digits that count.
+fn tick(value: f64) -> String {
+    let digits = if value.abs() >= 10.0 || value.fract() == 0.0 {
+        0
+    } else if value.abs() >= 1.0 {
+        1
+    } else {
+        3
+    };
+    format!("{value:.digits$}")
 }

@@ -108,8 +108,7 @@ pub fn compare(a: &Picture, b: &Picture, limits: &Limits) -> Result<Comparison, 
     };
     let metrics = Metrics::new(a, b);
     let over = |what: &str, value: f64, limit: Option<f64>| {
-        // Not "value > limit": a value that is not a number exceeds every limit.
-        let limit = limit.filter(|limit| !(value <= *limit))?;
+        let limit = limit.filter(|limit| value.is_nan() || value > *limit)?;
         Some(format!("{what} is {value:.4}, the limit {limit}"))
     };
     let exceeded = [

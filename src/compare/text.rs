@@ -26,16 +26,32 @@ impl Comparison {
         text
     }
 
+    /// A table of where the difference is; empty when there is none.
+    pub fn findings_text(&self) -> String {
+        let Some(v) = self.verdict.as_ref().filter(|v| !v.findings.is_empty()) else {
+            return String::new();
+        };
+        let head = ["where", "channel", "A", "B", "change", "z"];
+        let mut text = row(head.map(str::to_owned));
+        for f in &v.findings {
+            let [a, b] = f.means;
+            text += &row([
+                place(f),
+                CHANNELS[f.channel].into(),
+                format!("{a:.4}"),
+                format!("{b:.4}"),
+                change(a, b),
+                format!("{:.1}", f.z),
+            ]);
+        }
+        text
+    }
+
     /// The sentence, where the difference is, the metrics, and notes: lines of text.
     pub fn report(&self) -> String {
         let mut text = self.sentence() + "\n";
-        if let Some(v) = &self.verdict {
-            if !v.findings.is_empty() {
-                text += "\n  where                          channel        A        B    change       z\n";
-            }
-            for f in &v.findings {
-                let _ = writeln!(text, "  {}", finding(f));
-            }
+        for line in self.findings_text().lines() {
+            let _ = write!(text, "\n  {line}");
         }
         text += "\n";
         text += &metrics(&self.metrics);
@@ -82,6 +98,9 @@ fn seen(s: &Sensitivity) -> Option<String> {
 }
 
 pub(super) fn place(f: &Finding) -> String {
+    if f.whole {
+        return "in the whole picture".into();
+    }
     let r = &f.rect;
     match (r.width(), r.height()) {
         (1, 1) => format!("at pixel ({}, {})", r.x0, r.y0),
@@ -89,15 +108,8 @@ pub(super) fn place(f: &Finding) -> String {
     }
 }
 
-fn finding(f: &Finding) -> String {
-    let [a, b] = f.means;
-    let change = change(a, b);
-    format!(
-        "{:<30} {:<7} {a:>8.4} {b:>8.4} {change:>9} {:>7.1}",
-        place(f),
-        CHANNELS[f.channel],
-        f.z
-    )
+fn row([place, channel, a, b, change, z]: [String; 6]) -> String {
+    format!("{place:<30} {channel:<7} {a:>9} {b:>9} {change:>10} {z:>7}\n")
 }
 
 pub(super) fn change(a: f64, b: f64) -> String {

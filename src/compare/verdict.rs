@@ -56,6 +56,8 @@ pub enum Kind {
 pub struct Finding {
     /// Its pixels.
     pub rect: Rect,
+    /// Whether they are the whole picture.
+    pub whole: bool,
     /// 0, 1, 2: red, green, blue.
     pub channel: usize,
     /// Which test found it.
@@ -131,6 +133,7 @@ pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
                 });
                 all.extend(found.map(|(p, z, block)| Finding {
                     rect: block.rect,
+                    whole: block.rect == Rect::whole(a.size),
                     channel,
                     kind,
                     p,
@@ -158,7 +161,7 @@ pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
         alpha,
         p: all.first().map_or(1.0, |f| f.p),
         tests,
-        findings: pick(all, alpha, a.size),
+        findings: pick(all, alpha),
         sensitivity,
     }
 }
@@ -269,17 +272,14 @@ fn changes(seen: &mut Vec<f64>, grids: &[Grid], needed: f64) {
 }
 
 /// The findings worth telling: what is certain enough, and of overlapping blocks the most certain one.
-fn pick(all: Vec<Finding>, alpha: f64, size: [u32; 2]) -> Vec<Finding> {
+fn pick(all: Vec<Finding>, alpha: f64) -> Vec<Finding> {
     let mut kept: Vec<Finding> = Vec::new();
-    let whole = Rect::whole(size);
     for finding in all {
         if finding.p >= alpha || kept.len() == MOST_FINDINGS {
             break;
         }
-        let told = |k: &Finding| {
-            let same_part = (k.rect == whole) == (finding.rect == whole);
-            same_part && k.rect.intersection(&finding.rect).is_some()
-        };
+        let told =
+            |k: &Finding| k.whole == finding.whole && k.rect.intersection(&finding.rect).is_some();
         if !kept.iter().any(told) {
             kept.push(finding);
         }

@@ -56,14 +56,30 @@ impl GpuEngine {
         settings: &Settings,
         access: Option<Access>,
     ) -> Result<Self, GpuError> {
+        let access = access.unwrap_or_else(|| Access::choose_for(world, &gpu.info));
+        let kernel = compose(world, settings, Some(access));
+        // SAFETY: it is what `compose` made.
+        unsafe { Self::with_kernel(gpu, world, settings, kernel) }
+    }
+
+    /// The same with a kernel that has been changed, for tests that must see what a fault does to pictures.
+    ///
+    /// # Safety
+    ///
+    /// `kernel` is what [`compose`] made for this world and these settings, or indexes and loops as that does: it runs
+    /// without runtime checks.
+    pub unsafe fn with_kernel(
+        gpu: Gpu,
+        world: &World,
+        settings: &Settings,
+        kernel: Kernel,
+    ) -> Result<Self, GpuError> {
         let start = Instant::now();
         let gpu = gpu.into();
         let unable = |problem: String| GpuError::Unable {
             adapter: gpu.info.name.clone(),
             problem,
         };
-        let access = access.unwrap_or_else(|| Access::choose_for(world, &gpu.info));
-        let kernel = compose(world, settings, Some(access));
         if kernel.trips_per_sample > gpu.trip_limit {
             return Err(unable(format!(
                 "one path of this scene may take {} loop trips (max_depth {}), and this driver silently stops an \
@@ -154,6 +170,11 @@ impl GpuEngine {
     /// The kernel.
     pub fn kernel(&self) -> &Kernel {
         &self.kernel
+    }
+
+    /// Goes on with another seed: no part of the kernel depends on it.
+    pub fn reseed(&mut self, seed: u32) {
+        self.seed = seed;
     }
 
     /// Drivers may compile at the first dispatch: make it one without samples.

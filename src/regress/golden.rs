@@ -1,0 +1,207 @@
+//! Golden pictures: made with just enough samples, and read back with the settings that made them.
+
+use super::{Case, MakeEngine, render, text};
+use crate::compare::{Picture, verdict::verdict};
+use crate::film::Film;
+use crate::film::REPLICATES;
+use crate::film::coverage::Rect;
+use crate::output::write_exr;
+use crate::provenance::{Provenance, integrator_name, light_name};
+use crate::scene::{Scene, parse};
+use crate::settings::{Integrator, LightParts, Overrides, Settings};
+use crate::world::World;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::atomic::AtomicBool;
+
+/// Goldens are this wide unless a size is asked for.
+const WIDTH: u32 = 64;
+
+/// Samples at which the noise is looked at first.
+const FIRST_LOOK: u64 = 64;
+
+/// How to make goldens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Width and height; without, the scene's, made 64 pixels wide.
+    pub size: Option<[u32; 2]>,
+    /// The relative change of all light that is to be seen with 95 % probability.
+    pub power: f64,
+    /// The most samples a pixel.
+    pub most_samples: u64,
+    /// The false-alarm rate at which it is to be seen.
+    pub alpha: f64,
+}
+
+/// What a golden is like.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bless {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Samples a pixel.
+    pub samples: u64,
+    /// The relative change of all light that a comparison sees.
+    pub power: f64,
+    /// Whether that is less than was wanted, for the samples ran out.
+    pub short: bool,
+    /// Bytes of the file.
+    pub bytes: u64,
+}
+
+impl fmt::Display for Bless {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [w, h] = self.size;
+        let (samples, bytes, power) = (self.samples, self.bytes, 100.0 * self.power);
+        write!(
+            f,
+            "{w}x{h}, {samples} samples a pixel, {bytes} bytes; sees a change of all light by {power:.2} %"
+        )?;
+        if self.short {
+            f.write_str(" (less was wanted, but --max-spp allows no more samples)")?;
+        }
+        Ok(())
+    }
+}
+
+/// Renders the case's scene with just enough samples and makes that its golden; `None` when `stop` was set.
+pub fn bless(
+    case: &Case,
+    engine: &MakeEngine,
+    wanted: &Wanted,
+    stop: &AtomicBool,
+) -> Result<Option<Bless>, String> {
+    let path = case.scene_path();
+    let source = parse::read_text(&path).map_err(text)?;
+    let scene =
+        parse::parse_str(&path, &source).map_err(|e| parse::ReadError::Invalid(e).to_string())?;
+    let [w, h] = scene.camera.resolution;
+    let small = |w: u32, h: u32| {
+        let height = (f64::from(WIDTH) * f64::from(h) / f64::from(w)).round();
+        [WIDTH, (height as u32).max(1)]
+    };
+    let size = wanted
+        .size
+        .unwrap_or(if w > WIDTH { small(w, h) } else { [w, h] });
+    let overrides = Overrides {
+        size: Some(size),
+        ..Overrides::default()
+    };
+    let settings = Settings::resolve(&scene, &overrides);
+    let mut provenance = Provenance::new(&scene, source, &settings);
+    let (mut engine, tile) = engine(&World::new(&scene, size), &settings)?;
+    let mut film = Film::new(size, Rect::whole(size), settings.strata);
+    let period = settings.round() * REPLICATES as u64;
+    let whole_rounds = |n: f64| (n as u64).min(wanted.most_samples).div_ceil(period) * period;
+    let mut samples = whole_rounds(FIRST_LOOK as f64);
+    let power = loop {
+        if !render(
+            engine.as_mut(),
+            tile,
+            &mut film,
+            &mut provenance,
+            samples,
+            stop,
+        )? {
+            return Ok(None);
+        }
+        let picture = Picture::from_film(path.display().to_string(), &film, &provenance)?;
+        // Held against itself, it says what a comparison with its like would have seen.
+        let seen = verdict(&picture, &picture, wanted.alpha).sensitivity;
+        let power = seen.first().map_or(f64::INFINITY, |s| s.change);
+        if power <= wanted.power || samples >= wanted.most_samples {
+            break power;
+        }
+        // Noise falls with the square root of the samples; a first look may be far off.
+        let factor = (1.05 * (power / wanted.power).powi(2)).clamp(1.1, 8.0);
+        samples = whole_rounds(samples as f64 * factor);
+    };
+    let golden = case.golden_path();
+    let folder = case.dir.join("golden");
+    std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    write_exr(&golden, &film, &provenance).map_err(text)?;
+    case.clear();
+    let bytes = std::fs::metadata(&golden).map_err(|e| format!("{}: {e}", golden.display()))?;
+    Ok(Some(Bless {
+        size,
+        samples,
+        power,
+        short: power > wanted.power,
+        bytes: bytes.len(),
+    }))
+}
+
+/// What a golden's header says that it takes to make its like.
+pub(super) struct Facts {
+    pub scene_hash: String,
+    pub samples: u64,
+    size: [u32; 2],
+    seed: u32,
+    strata: u32,
+    max_depth: u32,
+    shadow_rays: u32,
+    light: LightParts,
+    integrator: Integrator,
+}
+
+impl Facts {
+    pub fn read(golden: &Picture) -> Result<Self, String> {
+        let (name, find) = (&golden.name, |key| golden.origin(key));
+        let lacks =
+            |key: &str| format!("{name}: its header says nothing of {key}; --bless makes it anew");
+        let noise = golden.noise.as_ref().ok_or_else(|| {
+            format!(
+                "{name}: it lacks error layers, samples, or two replicates; --bless makes it anew"
+            )
+        })?;
+        let samples = noise.samples[0];
+        if noise.samples.iter().any(|n| *n != samples) {
+            return Err(format!(
+                "{name}: its pixels have different numbers of samples"
+            ));
+        }
+        let named = |key| find(key).ok_or_else(|| lacks(key));
+        let kept = named("light")?;
+        let part = |name| kept.split(',').any(|p| p == name);
+        let light = LightParts {
+            emitted: part("emitted"),
+            direct: part("direct"),
+            indirect: part("indirect"),
+        };
+        let known = [Integrator::Path, Integrator::Whitted];
+        let integrator = named("integrator")?;
+        let integrator = known
+            .into_iter()
+            .find(|i| integrator_name(*i) == integrator)
+            .filter(|_| light_name(light) == kept)
+            .ok_or_else(|| format!("{name}: unknown light or integrator in its header"))?;
+        Ok(Self {
+            scene_hash: named("scene_hash")?.into(),
+            samples,
+            size: golden.size,
+            seed: number(golden, "seed").ok_or_else(|| lacks("seed"))?,
+            strata: number(golden, "strata").ok_or_else(|| lacks("strata"))?,
+            max_depth: number(golden, "max_depth").ok_or_else(|| lacks("max_depth"))?,
+            shadow_rays: number(golden, "shadow_rays").ok_or_else(|| lacks("shadow_rays"))?,
+            light,
+            integrator,
+        })
+    }
+
+    /// The golden's settings with another seed: noise that is shared is no evidence.
+    pub fn settings(&self, scene: &Scene) -> Settings {
+        let overrides = Overrides {
+            size: Some(self.size),
+            max_depth: Some(self.max_depth),
+            strata: Some(self.strata),
+            seed: Some(self.seed.wrapping_add(1)),
+            shadow_rays: Some(self.shadow_rays),
+            light: Some(self.light),
+            integrator: Some(self.integrator),
+        };
+        Settings::resolve(scene, &overrides)
+    }
+}
+
+fn number<T: FromStr>(golden: &Picture, key: &str) -> Option<T> {
+    golden.origin(key)?.parse().ok()
+}

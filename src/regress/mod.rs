@@ -1,0 +1,280 @@
+//! Image regression: a folder's scenes against their golden pictures, and the same verdict as an assertion.
+//!
+//! `DIR/NAME.toml` is rendered and compared with `DIR/golden/NAME.exr`, with as many samples as the golden has (the
+//! verdict is exact then) and another seed. What fails leaves its film, `NAME.actual.npz`, and the page
+//! of the comparison, `NAME.report.html`, beside the golden.
+
+mod assertion;
+mod golden;
+pub mod report;
+
+pub use assertion::{BLESS, assert_golden};
+pub use golden::{Bless, Wanted, bless};
+
+use crate::compare::{Comparison, Limits, Picture, compare, html};
+use crate::engine::Engine;
+use crate::film::coverage::Rect;
+use crate::film::{Film, store};
+use crate::output::{FileError, atomic};
+use crate::provenance::Provenance;
+use crate::run::{self, Job, Run, StopReason};
+use crate::scene::parse;
+use crate::settings::Settings;
+use crate::world::World;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Makes an engine for a scene.
+pub type MakeEngine<'a> =
+    dyn Fn(&World, &Settings) -> Result<(Box<dyn Engine>, u64), String> + Sync + 'a;
+
+/// A scene, a golden picture, or both, under one name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Case {
+    /// The files' stem.
+    pub name: String,
+    /// The folder that holds the scene.
+    pub dir: PathBuf,
+    /// Whether the scene is there.
+    pub scene: bool,
+    /// Whether the golden is there.
+    pub golden: bool,
+}
+
+/// What became of a case.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// The same up to its noise.
+    Passed(Box<Comparison>),
+    /// Different.
+    Failed(Box<Comparison>),
+    /// A scene without a golden.
+    New,
+    /// A golden without a scene.
+    Orphaned,
+    /// The scene or the golden can't be used, or nothing could be rendered; why.
+    Unusable(String),
+    /// A golden was written.
+    Blessed(Bless),
+}
+
+impl Outcome {
+    /// Its word in lists.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Outcome::Passed(_) => "passed",
+            Outcome::Failed(_) => "FAILED",
+            Outcome::New => "new",
+            Outcome::Orphaned => "orphaned",
+            Outcome::Unusable(_) => "unusable",
+            Outcome::Blessed(_) => "blessed",
+        }
+    }
+
+    /// Whether all is well.
+    pub fn good(&self) -> bool {
+        matches!(self, Outcome::Passed(_) | Outcome::Blessed(_))
+    }
+
+    /// What there is to say in one line.
+    pub fn detail(&self, case: &Case) -> String {
+        match self {
+            Outcome::Passed(c) | Outcome::Failed(c) => c.sentence(),
+            Outcome::New => format!("no {}: --bless makes it", case.golden_path().display()),
+            Outcome::Orphaned => format!(
+                "no {}: remove the golden if that is meant",
+                case.scene_path().display()
+            ),
+            Outcome::Unusable(why) => why.clone(),
+            Outcome::Blessed(b) => b.to_string(),
+        }
+    }
+}
+
+impl Case {
+    /// The scene file.
+    pub fn scene_path(&self) -> PathBuf {
+        self.dir.join(format!("{}.toml", self.name))
+    }
+
+    /// The golden picture.
+    pub fn golden_path(&self) -> PathBuf {
+        self.beside("exr")
+    }
+
+    /// The film that a failure leaves.
+    pub fn actual_path(&self) -> PathBuf {
+        self.beside("actual.npz")
+    }
+
+    /// The page that a failure leaves.
+    pub fn report_path(&self) -> PathBuf {
+        self.beside("report.html")
+    }
+
+    fn beside(&self, ending: &str) -> PathBuf {
+        self.dir
+            .join("golden")
+            .join(format!("{}.{ending}", self.name))
+    }
+
+    /// Renders and compares. `None` when `stop` was set.
+    pub fn run(
+        &self,
+        engine: &MakeEngine,
+        limits: &Limits,
+        stop: &AtomicBool,
+    ) -> Option<(Outcome, Option<[Picture; 2]>)> {
+        match (self.scene, self.golden) {
+            (false, _) => return Some((Outcome::Orphaned, None)),
+            (_, false) => return Some((Outcome::New, None)),
+            _ => {}
+        }
+        match self.compare(engine, limits, stop) {
+            Ok(Some((outcome, pictures))) => Some((outcome, Some(pictures))),
+            Ok(None) => None,
+            Err(why) => Some((Outcome::Unusable(why), None)),
+        }
+    }
+
+    fn compare(
+        &self,
+        engine: &MakeEngine,
+        limits: &Limits,
+        stop: &AtomicBool,
+    ) -> Result<Option<(Outcome, [Picture; 2])>, String> {
+        let golden = Picture::read(&self.golden_path()).map_err(text)?;
+        let facts = golden::Facts::read(&golden)?;
+        let source = parse::read_text(&self.scene_path()).map_err(text)?;
+        let scene = parse::parse_str(&self.scene_path(), &source)
+            .map_err(|e| parse::ReadError::Invalid(e).to_string())?;
+        let settings = facts.settings(&scene);
+        let mut provenance = Provenance::new(&scene, source, &settings);
+        if provenance.scene_hash != facts.scene_hash {
+            return Err(format!(
+                "{} is of another scene than {} now holds (hash {} and {}); if the change is meant, --bless makes it \
+                 anew",
+                self.golden_path().display(),
+                self.scene_path().display(),
+                short(&facts.scene_hash),
+                short(&provenance.scene_hash)
+            ));
+        }
+        let world = World::new(&scene, settings.size);
+        let (mut engine, tile) = engine(&world, &settings)?;
+        let rect = Rect::whole(settings.size);
+        let mut film = Film::new(settings.size, rect, settings.strata);
+        if !render(
+            engine.as_mut(),
+            tile,
+            &mut film,
+            &mut provenance,
+            facts.samples,
+            stop,
+        )? {
+            return Ok(None);
+        }
+        let name = self.scene_path().display().to_string();
+        let actual = Picture::from_film(name, &film, &provenance)?;
+        let comparison = compare(&golden, &actual, limits).map_err(text)?;
+        let leave = || -> Result<(), FileError> {
+            let page = html::page(&golden, &actual, &comparison);
+            store::save(&self.actual_path(), &film, &provenance)?;
+            atomic::replace(&self.report_path(), |f| f.write_all(page.as_bytes()))
+        };
+        let outcome = if comparison.same() {
+            self.clear();
+            Outcome::Passed(Box::new(comparison))
+        } else {
+            leave().map_err(text)?;
+            Outcome::Failed(Box::new(comparison))
+        };
+        Ok(Some((outcome, [golden, actual])))
+    }
+
+    /// Removes what an earlier failure left; what can't be removed does no harm.
+    fn clear(&self) {
+        for path in [self.actual_path(), self.report_path()] {
+            let _ = std::fs::remove_file(path);
+        }
+    }
+}
+
+fn text(e: impl std::fmt::Display) -> String {
+    e.to_string()
+}
+
+/// The first letters of a hash: enough to tell two apart.
+fn short(hash: &str) -> String {
+    hash.chars().take(12).collect()
+}
+
+/// Brings every pixel of the film to `samples` samples; false when `stop` was set.
+fn render(
+    engine: &mut dyn Engine,
+    tile_pixels: u64,
+    film: &mut Film,
+    provenance: &mut Provenance,
+    samples: u64,
+    stop: &AtomicBool,
+) -> Result<bool, String> {
+    let device = engine.device().clone();
+    let job = Job {
+        tiles: run::tiles(&[film.bounds], tile_pixels),
+        samples: 0..samples,
+        round: provenance.settings.round(),
+        time: None,
+        error: None,
+    };
+    let mut run = Run::new(&job, engine, film, stop);
+    let reason = run.go(|_, _| Ok::<(), crate::engine::EngineError>(()));
+    let tally = run.tally;
+    provenance.add_work(&device, tally.counters, tally.seconds);
+    provenance.describe(film);
+    if let Some((x, y, n)) = tally.counters.first_nonfinite {
+        return Err(format!(
+            "{} samples were not finite, the first at pixel {x}, {y}, sample {n}",
+            tally.counters.nonfinite
+        ));
+    }
+    Ok(reason.map_err(text)? != StopReason::Interrupted)
+}
+
+/// The scenes of `dir` and the goldens of `dir/golden` whose name contains `filter`, by name.
+pub fn cases(dir: &Path, filter: &str) -> Result<Vec<Case>, FileError> {
+    let scenes = stems(dir, "toml")?;
+    let golden = dir.join("golden");
+    let goldens = if golden.exists() {
+        stems(&golden, "exr")?
+    } else {
+        Vec::new()
+    };
+    let mut names: Vec<&String> = scenes.iter().chain(&goldens).collect();
+    names.sort();
+    names.dedup();
+    let wanted = names.into_iter().filter(|n| n.contains(filter));
+    Ok(wanted
+        .map(|name| Case {
+            name: name.clone(),
+            dir: dir.into(),
+            scene: scenes.contains(name),
+            golden: goldens.contains(name),
+        })
+        .collect())
+}
+
+/// Names of the files of `dir` with an extension, without it.
+fn stems(dir: &Path, extension: &str) -> Result<Vec<String>, FileError> {
+    let unreadable = |e| FileError::io(dir, "cannot read", &e);
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(dir).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if path.extension().is_some_and(|e| e == extension)
+            && let Some(stem) = path.file_stem()
+        {
+            names.push(stem.to_string_lossy().into_owned());
+        }
+    }
+    Ok(names)
+}

@@ -1,0 +1,298 @@
+//! What the verdict promises: false alarms no more often than stated, and differences seen.
+//!
+//! The full studies take hours on two cores and are ignored by default:
+//! `cargo test --release --test verdict -- --ignored --nocapture`
+
+mod common;
+
+use common::{film, read, scene, settings};
+use etendue::compare::{Limits, Picture, compare};
+use etendue::film::Film;
+use etendue::film::coverage::Rect;
+use etendue::gpu::{Choice, Gpu, GpuEngine};
+use etendue::kernel::{Kernel, compose};
+use etendue::provenance::Provenance;
+use etendue::scene::Scene;
+use etendue::settings::Settings;
+use etendue::world::World;
+use std::path::Path;
+
+fn text(name: &str) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = root.join("scenes").join(format!("{name}.toml"));
+    read(&path);
+    std::fs::read_to_string(path).expect("it has just been read")
+}
+
+/// Renders pictures of one scene, each with its own seed.
+struct Camera {
+    scene: Scene,
+    settings: Settings,
+    engine: GpuEngine,
+}
+
+impl Camera {
+    fn new(scene: Scene, size: [u32; 2], edit: impl FnOnce(&mut Kernel)) -> Self {
+        let settings = settings(&scene, size, 0);
+        let world = World::new(&scene, size);
+        let mut kernel = compose(&world, &settings, None);
+        edit(&mut kernel);
+        let gpu = Gpu::open(&Choice::default()).expect("an adapter; scripts/test installs one");
+        // SAFETY: edits change what is added up, no index and no loop.
+        let engine = unsafe { GpuEngine::with_kernel(gpu, &world, &settings, kernel) };
+        Self {
+            engine: engine.expect("a kernel that compiles"),
+            scene,
+            settings,
+        }
+    }
+
+    fn shoot(&mut self, seed: u32, samples: u64) -> Picture {
+        self.settings.seed = seed;
+        self.engine.reseed(seed);
+        let film = film(&mut self.engine, &self.settings, samples);
+        picture(&film, &Provenance::new(&self.scene, "", &self.settings))
+    }
+}
+
+fn picture(film: &Film, provenance: &Provenance) -> Picture {
+    Picture::from_film("film".into(), film, provenance).expect("it has samples")
+}
+
+/// The smallest false-alarm rate at which the two are different.
+fn p(a: &Picture, b: &Picture) -> f64 {
+    let comparison = compare(a, b, &Limits::default()).expect("comparable");
+    comparison.verdict.expect("both state their noise").p
+}
+
+/// p-values of `pairs` pairs of pictures of a scene that differ in their seeds.
+fn null_study(name: &str, pairs: u32, samples: u64) -> Vec<f64> {
+    let mut camera = Camera::new(scene(&text(name)), [32, 24], |_| {});
+    (0..pairs)
+        .map(|k| {
+            let [a, b] = [2 * k, 2 * k + 1].map(|seed| camera.shoot(10_000 + seed, samples));
+            p(&a, &b)
+        })
+        .collect()
+}
+
+const NULL_SCENES: [&str; 4] = ["caustic", "three_materials", "diffuse", "phong_gallery"];
+
+/// The most alarms in `n` trials at rate `p` that chance alone exceeds with probability 10⁻³ at most.
+fn most_alarms(n: usize, p: f64) -> usize {
+    let n = n as f64;
+    let (mut k, mut term) = (0usize, (1.0 - p).powf(n));
+    let mut below = term;
+    while 1.0 - below > 1e-3 {
+        term *= (n - k as f64) / (k as f64 + 1.0) * p / (1.0 - p);
+        k += 1;
+        below += term;
+    }
+    k
+}
+
+fn check_false_alarms(pairs: u32, samples: u64) {
+    let mut all = Vec::new();
+    for name in NULL_SCENES {
+        let ps = null_study(name, pairs, samples);
+        let count = |rate: f64| ps.iter().filter(|p| **p < rate).count();
+        let least = ps.iter().copied().fold(1.0, f64::min);
+        println!(
+            "{name}: {} pairs at {samples} samples, false alarms at 0.001: {}, 0.01: {}, 0.05: {}, 0.2: {}; least p {least:.1e}",
+            ps.len(),
+            count(0.001),
+            count(0.01),
+            count(0.05),
+            count(0.2)
+        );
+        all.extend(ps);
+    }
+    for rate in [0.001, 0.01, 0.05, 0.2] {
+        let alarms = all.iter().filter(|p| **p < rate).count();
+        let most = most_alarms(all.len(), rate);
+        assert!(
+            alarms <= most,
+            "{alarms} false alarms in {} at rate {rate}; chance explains {most}",
+            all.len()
+        );
+    }
+}
+
+#[test]
+fn false_alarms_are_as_rare_as_stated() {
+    check_false_alarms(12, 64);
+}
+
+#[test]
+#[ignore = "2000 pairs: minutes to an hour"]
+fn false_alarms_in_2000_pairs() {
+    check_false_alarms(500, 64);
+}
+
+#[test]
+#[ignore = "2000 pairs: minutes to an hour"]
+fn false_alarms_in_2000_pairs_of_few_samples() {
+    check_false_alarms(500, 16);
+}
+
+/// Pictures of unequal samples: the sign test is no longer exact.
+#[test]
+#[ignore = "800 pairs: minutes to an hour"]
+fn false_alarms_of_unequal_samples() {
+    let mut all = Vec::new();
+    for name in NULL_SCENES {
+        let mut camera = Camera::new(scene(&text(name)), [32, 24], |_| {});
+        let ps: Vec<f64> = (0..200)
+            .map(|k| {
+                let few = camera.shoot(20_000 + 2 * k, 16);
+                p(&few, &camera.shoot(20_001 + 2 * k, 256))
+            })
+            .collect();
+        println!(
+            "{name}: least p {:.1e}",
+            ps.iter().copied().fold(1.0, f64::min)
+        );
+        all.extend(ps);
+    }
+    let alarms = all.iter().filter(|p| **p < 0.001).count();
+    assert!(
+        alarms <= most_alarms(all.len(), 0.001),
+        "{alarms} false alarms"
+    );
+}
+
+#[test]
+fn counts_that_chance_explains() {
+    // Binomial(2000, 0.001): P(> 7) = 1.1e-3, P(> 8) = 2.4e-4.
+    assert_eq!(most_alarms(2000, 0.001), 8);
+    assert_eq!(most_alarms(1, 0.0001), 0);
+}
+
+/// Something that a renderer could do wrong.
+struct Fault {
+    name: &'static str,
+    scene: &'static str,
+    /// What of the scene's text is replaced, and by what.
+    text: Option<(&'static str, &'static str)>,
+    /// What of the kernel.
+    kernel: Option<(&'static str, &'static str)>,
+}
+
+/// Half a pixel at the blue sphere's distance of 5.9: 2 · 5.9 · tan(20.5°) / 96 / 2 = 0.023. A pixel's width at the
+/// middle of the diffuse box, 5 away: 2 · 5 · tan(18°) / 96 = 0.034.
+const FAULTS: [Fault; 5] = [
+    Fault {
+        name: "1 % more light from the brighter lamp",
+        scene: "three_materials",
+        text: Some(("[20.0, 16.8, 12.6]", "[20.2, 16.968, 12.726]")),
+        kernel: None,
+    },
+    Fault {
+        name: "a sphere half a pixel aside",
+        scene: "three_materials",
+        text: Some(("[-1.55, 1.55, -1.2]", "[-1.527, 1.55, -1.2]")),
+        kernel: None,
+    },
+    Fault {
+        name: "2 % missing from what glass transmits",
+        scene: "three_materials",
+        text: Some((
+            "ior  = 1.52",
+            "ior  = 1.52\ntransmittance = [0.98, 0.98, 0.98]",
+        )),
+        kernel: None,
+    },
+    Fault {
+        name: "an exponent of 110, not 100",
+        scene: "phong_gallery",
+        text: Some((
+            "specular = [0.30, 0.30, 0.30]\nexponent = 100.0",
+            "specular = [0.30, 0.30, 0.30]\nexponent = 110.0",
+        )),
+        kernel: None,
+    },
+    Fault {
+        name: "shadow rays that start a pixel's width too far out",
+        scene: "diffuse",
+        text: None,
+        kernel: Some(("Ray(v.p, to.d, face", "Ray(v.p + 0.034 * to.d, to.d, face")),
+    },
+];
+
+fn replace_once(text: &str, (from, to): (&str, &str)) -> String {
+    assert_eq!(text.matches(from).count(), 1, "one {from:?}");
+    text.replace(from, to)
+}
+
+/// Of `trials` pairs of pictures, one without and one with the fault, the number told apart.
+fn seen(fault: &Fault, size: [u32; 2], samples: u64, trials: u32) -> u32 {
+    let good = text(fault.scene);
+    let bad = fault
+        .text
+        .map_or(good.clone(), |edit| replace_once(&good, edit));
+    let mut before = Camera::new(scene(&good), size, |_| {});
+    let mut after = Camera::new(scene(&bad), size, |kernel| {
+        if let Some(edit) = fault.kernel {
+            kernel.wgsl = replace_once(&kernel.wgsl, edit);
+        }
+    });
+    let mut seen = 0;
+    let mut least_certain: f64 = 0.0;
+    for k in 0..trials {
+        let p = p(
+            &before.shoot(1 + 2 * k, samples),
+            &after.shoot(2 + 2 * k, samples),
+        );
+        seen += u32::from(p < Limits::default().alpha);
+        least_certain = least_certain.max(p);
+    }
+    println!(
+        "{}: seen in {seen} of {trials} trials, largest p {least_certain:.1e}",
+        fault.name
+    );
+    seen
+}
+
+/// At a quarter of the pixels of the full study, and so harder. Were a fault seen in less than 22 % of all trials, this
+/// would fail with more than 95 % probability: it tells a broken test, the full study tells the power.
+#[test]
+fn faults_are_seen() {
+    for fault in &FAULTS {
+        assert_eq!(seen(fault, [64, 48], 1024, 2), 2, "{}", fault.name);
+    }
+}
+
+#[test]
+#[ignore = "a thousand pictures of 12 million paths: hours"]
+fn faults_are_seen_in_99_of_100_trials() {
+    for fault in &FAULTS {
+        assert!(seen(fault, [128, 96], 1024, 100) >= 99, "{}", fault.name);
+    }
+}
+
+/// A region is compared like a picture, and the rest is not.
+#[test]
+fn pixels_without_samples_are_left_out() {
+    let s = scene(&text("diffuse"));
+    let settings = settings(&s, [32, 24], 1);
+    let rect = Rect {
+        x0: 4,
+        y0: 4,
+        x1: 20,
+        y1: 20,
+    };
+    let mut shots = [1, 2].map(|seed| {
+        let mut engine = common::gpu(&s, &settings, None);
+        engine.reseed(seed);
+        let mut film = Film::new(settings.size, rect, settings.strata);
+        use etendue::engine::Engine as _;
+        engine
+            .render(&mut film, rect, 0..64, &Default::default())
+            .expect("rendered");
+        picture(&film, &Provenance::new(&s, "", &settings))
+    });
+    assert!(p(&shots[0], &shots[1]) > 0.001);
+    let inside = 10 * 32 + 10;
+    shots[1].rgb[inside] = [50.0; 3];
+    assert!(p(&shots[0], &shots[1]) < 0.001, "a wrong pixel is seen");
+}
