@@ -56,6 +56,7 @@ impl GpuEngine {
         settings: &Settings,
         access: Option<Access>,
     ) -> Result<Self, GpuError> {
+        let gpu = gpu.into();
         let access = access.unwrap_or_else(|| Access::choose_for(world, &gpu.info));
         let kernel = compose(world, settings, Some(access));
         // SAFETY: it is what `compose` made.
@@ -69,7 +70,7 @@ impl GpuEngine {
     /// `kernel` is what [`compose`] made for this world and these settings, or indexes and loops as that does: it runs
     /// without runtime checks.
     pub unsafe fn with_kernel(
-        gpu: Gpu,
+        gpu: impl Into<Arc<Gpu>>,
         world: &World,
         settings: &Settings,
         kernel: Kernel,

@@ -226,6 +226,7 @@ fn render(
         round: provenance.settings.round(),
         time: None,
         error: None,
+        call: run::CALL,
     };
     let mut run = Run::new(&job, engine, film, stop);
     let reason = run.go(|_, _| Ok::<(), crate::engine::EngineError>(()));
