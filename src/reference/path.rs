@@ -17,7 +17,7 @@ use glam::DVec3;
 const FIRST_ROULETTE: u32 = 5;
 
 /// The most likely that a path survives roulette: light caught between perfect reflectors ends, too.
-const MOST_LIKELY: f64 = 0.99;
+const MOST_LIKELY: f64 = 0.999;
 
 /// What one path has brought.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

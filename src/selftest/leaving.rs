@@ -10,9 +10,9 @@ use crate::world::{AIR, Geometry};
 use glam::DVec3;
 
 /// Primitives of each kind.
-const SPECIMENS: usize = 80;
+const SPECIMENS: usize = 32;
 /// Rays aimed at each, of which those that land leave again, four times.
-const AIMED: usize = 1000;
+const AIMED: usize = 2500;
 
 /// Kinds of primitive, by what they are made of.
 const KINDS: [(&str, bool); 7] = [
@@ -111,6 +111,7 @@ impl Specimen {
         let on_it = |l: &Landing| l.surface == Some(number);
         let landed: Vec<Landing> = range.shoot(&aimed)?.into_iter().filter(on_it).collect();
         let mut shots = Vec::new();
+        let mut starts = Vec::new();
         for l in &landed {
             for k in 0..4 {
                 let cosine = if k < 2 {
@@ -125,38 +126,43 @@ impl Specimen {
                     (l.normal, AIR)
                 };
                 shots.push(Shot::from(l, dice.around(axis, cosine), medium));
+                starts.push(l.normal);
             }
         }
         let landings = range.shoot(&shots)?;
         let scale = center.length() + self.size;
-        let wrong = |(shot, landing): &(&Shot, &Landing)| {
-            let outwards = shot.medium == AIR;
-            match exit(&primitive.geometry, shot.origin, shot.direction).filter(|_| !outwards) {
+        let wrong = |((shot, start), landing): &((&Shot, &DVec3), &Landing)| {
+            let exact = exit(&primitive.geometry, shot.origin, **start, shot.direction);
+            match exact.filter(|_| shot.medium != AIR) {
                 None => on_it(landing) || !landing.is_finite(),
-                Some(exact) => {
-                    // Rounding of the point, seen along the ray where it meets the surface again.
-                    let slope = landing.normal.dot(shot.direction).abs().max(1e-4);
+                Some((exact, slope)) => {
+                    // Rounding of the point, magnified by the slope at which the ray meets the surface again.
+                    let slope = landing
+                        .normal
+                        .dot(shot.direction)
+                        .abs()
+                        .min(slope)
+                        .max(1e-4);
                     let slack = 32.0 * b.epsilon() * scale / slope;
                     !on_it(landing) || !landing.is_finite() || (landing.t - exact).abs() > slack
                 }
             }
         };
-        Ok((
-            shots.len(),
-            shots.iter().zip(&landings).filter(wrong).count(),
-        ))
+        let shot = shots.iter().zip(&starts).zip(&landings);
+        Ok((shots.len(), shot.filter(wrong).count()))
     }
 }
 
-/// Distance at which a ray from the surface into the solid leaves it, exactly; `None` for what it never leaves.
-fn exit(geometry: &Geometry, from: DVec3, direction: DVec3) -> Option<f64> {
+/// Distance at which a ray from the surface, where its normal is `start`, into the solid leaves it, exactly, and the
+/// slope of the ray to a cylinder's axis; `None` for what it never leaves.
+fn exit(geometry: &Geometry, from: DVec3, start: DVec3, direction: DVec3) -> Option<(f64, f64)> {
     match *geometry {
-        Geometry::Sphere { center, .. } => Some(-2.0 * direction.dot(from - center)),
+        Geometry::Sphere { center, .. } => Some((-2.0 * direction.dot(from - center), 1.0)),
         Geometry::HugeSphere {
             pole,
             normal,
             radius,
-        } => Some(-2.0 * direction.dot(from - pole + normal * radius)),
+        } => Some((-2.0 * direction.dot(from - pole + normal * radius), 1.0)),
         Geometry::Cylinder {
             base,
             axis,
@@ -165,13 +171,19 @@ fn exit(geometry: &Geometry, from: DVec3, direction: DVec3) -> Option<f64> {
         } => {
             let across = |p: DVec3| p - axis * axis.dot(p);
             let (m, d) = (across(from - base), across(direction));
-            // The far root of the side; from the side itself one root is 0.
             let (a, b) = (d.length_squared(), m.dot(d));
+            // On the side itself one root is 0; from a cap the way out is the far root.
+            let on_side = start.dot(axis).abs() < 0.5;
             let c = (m.length() - radius) * (m.length() + radius);
-            let side = (-b + (b * b - a * c).max(0.0).sqrt()) / a;
+            let root = if on_side {
+                -b
+            } else {
+                (b * b - a * c).max(0.0).sqrt()
+            };
+            let side = (-b + root) / a;
             let along = axis.dot(direction);
             let cap = if along > 0.0 { offsets[1] } else { offsets[0] };
-            Some(side.min((cap - axis.dot(from)) / along))
+            Some((side.min((cap - axis.dot(from)) / along), a.sqrt()))
         }
         Geometry::Plane { .. } | Geometry::Disk { .. } => None,
     }

@@ -18,6 +18,7 @@ mod measure;
 mod phong;
 mod rays;
 mod samplers;
+mod shadows;
 mod tubes;
 
 pub use backend::{Backend, Trouble};
@@ -63,6 +64,7 @@ pub fn cases() -> Vec<Case> {
         furnace::CASES,
         glass::CASES,
         lights::CASES,
+        shadows::CASES,
         leaks::CASES,
         depth::CASES,
         phong::CASES,
