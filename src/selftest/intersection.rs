@@ -7,7 +7,7 @@ use super::measure::{Mean, Measure, Tolerance};
 use super::rays::{Dice, Landing, Range, Shot};
 use crate::scene::{Bsdf, Shape};
 use crate::settings::Settings;
-use crate::world::AIR;
+use crate::world::{AIR, Geometry, WorldPrimitive};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -246,7 +246,7 @@ fn zero_components(b: &Backend) -> Result<Vec<Measure>, Trouble> {
             let scene = Build::new(eye, eye + v(0.1, 0.2, 1.0), 40.0);
             let range = Range::new(b, &with_light(scene.add(shape, bsdf)), None);
             let p = range.world().primitives[0];
-            let shots = axial_shots(&[0, p.faces[0], p.faces[1], p.faces[2]], &[AIR, p.solid]);
+            let shots = axial_shots(&p);
             let landings = range.shoot(&shots)?;
             shots_fired += shots.len();
             broken += landings
@@ -263,7 +263,7 @@ fn zero_components(b: &Backend) -> Result<Vec<Measure>, Trouble> {
 }
 
 /// Along every axis, with zeros of either sign, from where a square root or a quotient may end.
-fn axial_shots(faces: &[u32], media: &[u32]) -> Vec<Shot> {
+fn axial_shots(p: &WorldPrimitive) -> Vec<Shot> {
     let origins = [
         DVec3::ZERO,
         v(0.0, 0.5, 0.0),
@@ -276,14 +276,27 @@ fn axial_shots(faces: &[u32], media: &[u32]) -> Vec<Shot> {
         v(2.0, 0.0, 0.0),
         v(1.0, -3.0, 0.0),
     ];
+    // The faces that one can stand on there, and none.
+    let faces = |o: DVec3| {
+        let (side, flat) = (o.x.hypot(o.z), |y: f64| o.y == y && o.x.hypot(o.z) <= 1.0);
+        let stands = match p.geometry {
+            Geometry::Sphere { .. } => [o.length() == 1.0, false, false],
+            Geometry::Cylinder { .. } => {
+                let on_side = side == 1.0 && (0.0..=1.0).contains(&o.y);
+                [on_side, flat(0.0), flat(1.0)]
+            }
+            Geometry::Disk { .. } => [flat(0.0), false, false],
+            _ => [o.y == 0.0, false, false],
+        };
+        let named = p.faces.into_iter().zip(stands);
+        named.filter_map(|(face, on)| on.then_some(face)).chain([0])
+    };
     let mut shots = Vec::new();
     for zero in [0.0, -0.0] {
         for one in [1.0, -1.0] {
             for direction in [v(one, zero, zero), v(zero, one, zero), v(zero, zero, one)] {
-                for &origin in &origins {
-                    for (&face, &medium) in
-                        faces.iter().flat_map(|f| media.iter().map(move |m| (f, m)))
-                    {
+                for origin in origins {
+                    for (face, medium) in faces(origin).flat_map(|f| [(f, AIR), (f, p.solid)]) {
                         shots.push(Shot {
                             origin,
                             direction,
