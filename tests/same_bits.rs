@@ -122,6 +122,28 @@ fn cuts_tiles_and_regions_touch_no_bit() {
     }
 }
 
+/// An engine keeps the running sums of its last call: they must not find their way into another film.
+#[test]
+fn films_in_turns_on_one_engine_do_not_mix() {
+    let scene = three_materials();
+    let settings = settings(&scene, 2);
+    let film = || Film::new(SIZE, WHOLE, 2);
+    let fresh = || gpu(&scene, &settings, None);
+    let (mut slice, mut whole) = (film(), film());
+    go(&mut fresh(), &mut slice, WHOLE, 9..14, &[]);
+    go(&mut fresh(), &mut whole, WHOLE, 0..30, &[]);
+    let mut slice_alone = slice.clone();
+    go(&mut fresh(), &mut slice_alone, WHOLE, 14..30, &[]);
+
+    let mut engine = fresh();
+    let mut turns = film();
+    go(&mut engine, &mut turns, WHOLE, 0..14, &[]);
+    go(&mut engine, &mut slice, WHOLE, 14..30, &[20]);
+    go(&mut engine, &mut turns, WHOLE, 14..30, &[17]);
+    assert_eq!(slice.partial(), slice_alone.partial());
+    assert_eq!(turns.partial(), whole.partial());
+}
+
 #[test]
 fn another_seed_gives_another_picture() {
     let scene = three_materials();

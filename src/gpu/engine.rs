@@ -6,7 +6,7 @@ use super::tile::Tile;
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
 use crate::film::coverage::Rect;
-use crate::film::{BLOCK, Film, REPLICATES, samples_before};
+use crate::film::{BLOCK, Film, REPLICATES, Sums, samples_before};
 use crate::kernel::{Access, Kernel, compose};
 use crate::settings::Settings;
 use crate::world::World;
@@ -30,11 +30,38 @@ pub struct GpuEngine {
     film_layout: wgpu::BindGroupLayout,
     params: wgpu::Buffer,
     tile: Option<Tile>,
+    /// What the tile's textures hold since the last call, as it was read back.
+    held: Option<Held>,
     strata: u32,
     seed: u32,
     /// Seconds that one sample of one pixel takes, as measured so far.
     seconds_per_path: Option<f64>,
     compile_seconds: f64,
+}
+
+/// Running sums that lie in a tile's textures.
+struct Held {
+    rect: Rect,
+    /// The texture of each replicate.
+    place: [Option<usize>; REPLICATES],
+    /// The sums, rows of the tile.
+    running: Vec<[Sums<f32>; REPLICATES]>,
+}
+
+impl Held {
+    /// Whether the film goes on from just these sums: they need not be put into the textures again then.
+    fn is_in(&self, film: &Film, rect: Rect) -> bool {
+        let width = rect.width() as usize;
+        self.rect == rect
+            && !film.partial().is_empty()
+            && (rect.y0..rect.y1)
+                .zip(self.running.chunks_exact(width))
+                .all(|(y, row)| {
+                    let at = film.index(rect.x0, y);
+                    let bytes: &[u8] = bytemuck::cast_slice(row);
+                    bytes == bytemuck::cast_slice::<_, u8>(&film.partial()[at..at + width])
+                })
+    }
 }
 
 impl GpuEngine {
@@ -149,6 +176,7 @@ impl GpuEngine {
             film_layout,
             params,
             tile: None,
+            held: None,
             strata: settings.strata,
             seed: settings.seed,
             seconds_per_path: None,
@@ -199,6 +227,7 @@ impl GpuEngine {
         let size = [rect.width(), rect.height()];
         if self.tile.as_ref().is_none_or(|t| t.size != size) {
             self.tile = None;
+            self.held = None;
             let oom = self
                 .gpu
                 .device
@@ -281,7 +310,7 @@ impl GpuEngine {
         rect: Rect,
         samples: Range<u64>,
         stop: &AtomicBool,
-    ) -> Result<super::tile::TileData, EngineError> {
+    ) -> Result<Vec<[u32; 4]>, EngineError> {
         let device_error = EngineError::Device;
         self.prepare_tile(rect).map_err(device_error)?;
         let tile = self
@@ -289,12 +318,21 @@ impl GpuEngine {
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
         let mut place = [None; REPLICATES];
+        let held = self.held.take();
         if !samples.start.is_multiple_of(BLOCK) {
-            let pixels = (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
-            let running: Vec<_> = pixels.map(|(x, y)| film.partial_at(x, y)).collect();
-            tile.upload(&self.gpu, &running);
-            place = [Some(0); REPLICATES];
+            place = match &held {
+                Some(held) if held.is_in(film, rect) => held.place,
+                _ => {
+                    let pixels =
+                        (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
+                    let running: Vec<_> = pixels.map(|(x, y)| film.partial_at(x, y)).collect();
+                    tile.upload(&self.gpu, &running);
+                    [Some(0); REPLICATES]
+                }
+            };
         }
+        // Its memory serves again: fresh pages would cost as much as filling them.
+        let mut running = held.map_or(Vec::new(), |held| held.running);
         let mut encoder = self
             .gpu
             .device
@@ -326,7 +364,15 @@ impl GpuEngine {
             .tile
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
-        tile.download(&self.gpu, &place).map_err(device_error)
+        let counters = tile
+            .download(&self.gpu, &place, &mut running)
+            .map_err(device_error)?;
+        self.held = Some(Held {
+            rect,
+            place,
+            running,
+        });
+        Ok(counters)
     }
 }
 
@@ -338,13 +384,14 @@ impl Engine for GpuEngine {
         samples: Range<u64>,
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError> {
-        let data = self.render_tile(film, rect, samples.clone(), stop)?;
+        let counted = self.render_tile(film, rect, samples.clone(), stop)?;
+        let held = self.held.as_ref().map_or(&[][..], |h| &h.running);
         let mut counters = Counters {
             paths: rect.area() * (samples.end - samples.start),
             ..Counters::default()
         };
         let width = rect.width() as usize;
-        for (i, c) in data.counters.iter().enumerate() {
+        for (i, c) in counted.iter().enumerate() {
             counters.rays += u64::from(c[0]);
             counters.truncated += u64::from(c[1]);
             counters.nonfinite += u64::from(c[2]);
@@ -354,7 +401,7 @@ impl Engine for GpuEngine {
             }
         }
         film.put_block(rect, samples, |x, y| {
-            data.running[(y - rect.y0) as usize * width + (x - rect.x0) as usize]
+            held[(y - rect.y0) as usize * width + (x - rect.x0) as usize]
         });
         Ok(counters)
     }

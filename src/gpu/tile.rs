@@ -144,12 +144,14 @@ impl Tile {
         }
     }
 
-    /// Reads the counters, and each replicate from the texture that `place` says; `None` reads as zeros.
+    /// Reads each replicate from the texture that `place` says (`None` reads as zeros) into `running`, rows of pixels, and
+    /// returns the counters: rays, truncated paths, non-finite samples, 1 + number of the first of those.
     pub fn download(
         &self,
         gpu: &Gpu,
         place: &[Option<usize>; REPLICATES],
-    ) -> Result<TileData, String> {
+        running: &mut Vec<[Sums<f32>; REPLICATES]>,
+    ) -> Result<Vec<[u32; 4]>, String> {
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -192,37 +194,27 @@ impl Tile {
             .map_err(|e| format!("reading back failed: {e}"))?;
         let bytes: &[u8] = &mapped;
         let pixels = self.size[0] as usize * self.size[1] as usize;
-        let mut data = TileData {
-            running: vec![Default::default(); pixels],
-            counters: bytemuck::pod_collect_to_vec(&bytes[..counter_bytes as usize]),
-        };
+        let counters = bytemuck::pod_collect_to_vec(&bytes[..counter_bytes as usize]);
         let width = self.size[0] as usize;
         let stride = row_bytes(self.size[0]) as usize;
-        for (r, k) in place.iter().enumerate() {
-            if k.is_none() {
-                continue;
-            }
-            let layer = &bytes[counter_bytes.next_multiple_of(256) as usize
-                + layer_bytes(self.size) as usize * r..];
-            for (y, row) in data.running.chunks_exact_mut(width).enumerate() {
-                let texels =
-                    layer[y * stride..][..width * TEXEL as usize].chunks_exact(TEXEL as usize);
-                for (pixel, texel) in row.iter_mut().zip(texels) {
-                    pixel[r] = bytemuck::pod_read_unaligned(texel);
-                }
+        let layers = &bytes[counter_bytes.next_multiple_of(256) as usize..];
+        running.resize(pixels, Default::default());
+        for (y, row) in running.chunks_exact_mut(width).enumerate() {
+            let rows: [_; REPLICATES] = std::array::from_fn(|r| {
+                place[r].map(|_| &layers[layer_bytes(self.size) as usize * r + y * stride..])
+            });
+            for (x, pixel) in row.iter_mut().enumerate() {
+                *pixel = rows.map(|row| {
+                    row.map_or(Default::default(), |row| {
+                        bytemuck::pod_read_unaligned(&row[x * TEXEL as usize..][..TEXEL as usize])
+                    })
+                });
             }
         }
         drop(mapped);
         self.staging.unmap();
-        Ok(data)
+        Ok(counters)
     }
-}
-
-/// What a tile holds, rows of pixels.
-pub(super) struct TileData {
-    pub running: Vec<[Sums<f32>; REPLICATES]>,
-    /// Rays, truncated paths, non-finite samples, 1 + number of the first of those.
-    pub counters: Vec<[u32; 4]>,
 }
 
 fn layer_bytes(size: [u32; 2]) -> u64 {
