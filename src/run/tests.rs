@@ -176,6 +176,34 @@ fn the_error_ends_a_run_at_the_same_sample_however_slow_the_machine() {
     assert_eq!(ends[0], ends[1]);
 }
 
+/// The noise of the fake engine is white, so the fitted law is the true one: what is left of it is chance.
+#[test]
+fn forecasts_of_the_error_come_true() {
+    let size = [32, 32];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let mut job = job(size, 512, 0..1 << 20);
+    job.error = Some(0.03);
+    let mut engine = Fake::new();
+    let stop = AtomicBool::new(false);
+    let mut forecasts = Vec::new();
+    let mut run = Run::new(&job, &mut engine, &mut film, &stop);
+    let reason = run.go(|_, tally| {
+        let f = tally.forecast;
+        assert_eq!(f.is_some(), tally.error.is_some(), "at {}", tally.samples);
+        forecasts.extend(f.map(|f| tally.samples / f.fraction));
+        assert!(f.is_none_or(|f| (0.0..=1.0).contains(&f.fraction) && f.left >= 0.0));
+        Ok::<(), EngineError>(())
+    });
+    assert_eq!(reason.unwrap(), StopReason::Error);
+    let end = film.coverage.samples().0 as f64;
+    assert!(forecasts.len() > 10 && end > 200.0, "{end}");
+    for needed in forecasts {
+        // From the first look at 16 samples on: the next or the last check but one.
+        let off = needed / end;
+        assert!((0.75..=1.3).contains(&off), "{needed} of {end}");
+    }
+}
+
 #[test]
 fn checks_are_whole_rounds_of_all_replicates() {
     let mut count = 0;
