@@ -33,7 +33,7 @@ pub struct Job {
     pub round: u64,
     /// Stop after this long in the engine.
     pub time: Option<Duration>,
-    /// Stop when the relative error is at most this.
+    /// Stop when the relative error ([`Film::cautious_error`]) is at most this.
     pub error: Option<f64>,
     /// How long a call to the engine should take at most, usually [`CALL`].
     pub call: Duration,
@@ -61,7 +61,7 @@ pub struct Tally {
     pub seconds: f64,
     /// Of the samples that the job wants, those that a pixel has now, on average over the pixels.
     pub samples: f64,
-    /// Relative error when it was last looked at, and the samples a pixel then.
+    /// [`Film::cautious_error`] when it was last looked at, and the samples a pixel then.
     pub error: Option<(u64, f64)>,
     /// Where the end is, by the stop condition that looks nearest; `None` while nothing is known.
     pub forecast: Option<Forecast>,
@@ -264,7 +264,7 @@ impl<'a> Run<'a> {
 
     /// Looks at the error after `count` samples of every pixel; whether it is small enough.
     fn enough(&mut self, count: u64) -> bool {
-        let Some(error) = self.film.relative_error() else {
+        let Some(error) = self.film.cautious_error() else {
             return false;
         };
         self.tally.error = Some((count, error));

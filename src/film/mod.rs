@@ -232,6 +232,30 @@ impl Film {
         Some((ratio / n as f64).sqrt())
     }
 
+    /// The relative error as a stop condition takes it. [`relative_error`](Self::relative_error) divides a pixel's error by
+    /// its luminance, and where light comes in rare bright samples both rest on the same ones: pixels that had them
+    /// state a large error beside a luminance that is too large, the others a small one. Here each replicate's share of
+    /// s² is divided by the luminance that the *other* replicates have found. That is the same where the error is small,
+    /// and rather too large than too small where it is not.
+    pub fn cautious_error(&self) -> Option<f64> {
+        self.relative_error()?;
+        let floor = 0.1 * self.mean_luminance();
+        if floor == 0.0 {
+            return Some(0.0);
+        }
+        let (mut sum, mut pixels) = (0.0, 0u64);
+        for (rect, ranges) in self.coverage.cells() {
+            let counts = replicate_counts(ranges, self.strata);
+            for y in rect.y0..rect.y1 {
+                for x in rect.x0..rect.x1 {
+                    sum += cautious_square(&self.total(x, y), &counts, floor);
+                }
+            }
+            pixels += rect.area();
+        }
+        Some((sum / pixels as f64).sqrt())
+    }
+
     /// Mean luminance over the pixels that have samples; 0 if there are none.
     pub fn mean_luminance(&self) -> f64 {
         let (mut sum, mut n) = (0.0, 0u64);
@@ -303,6 +327,22 @@ fn estimate(sums: &[Sums<f64>; REPLICATES], counts: &[u64; REPLICATES]) -> Estim
     }
 }
 
+/// Σ k_r (y_r - y)² / ((R - 1) n) / (y_-r² + floor²) over the R >= 2 replicates that have samples: y_r is the mean
+/// luminance of the k_r samples of replicate r, y that of all n, and y_-r that of those of the others.
+fn cautious_square(sums: &[Sums<f64>; REPLICATES], counts: &[u64; REPLICATES], floor: f64) -> f64 {
+    let light = sums.map(|s| luminance([s[0], s[1], s[2]]));
+    let all: f64 = light.iter().sum();
+    let n = counts.iter().sum::<u64>() as f64;
+    let replicates = counts.iter().filter(|&&k| k > 0).count() as f64;
+    let term = |(light, &k): (&f64, &u64)| {
+        let k = k as f64;
+        let others = (all - light) / (n - k);
+        k * (light / k - all / n).powi(2) / (others * others + floor * floor)
+    };
+    let with_samples = light.iter().zip(counts).filter(|(_, k)| **k > 0);
+    with_samples.map(term).sum::<f64>() / ((replicates - 1.0) * n)
+}
+
 /// How many of the sample numbers in `ranges` fall to each replicate.
 pub fn replicate_counts(ranges: &[Range<u64>], strata: u32) -> [u64; REPLICATES] {
     let round = u64::from(strata) * u64::from(strata);
@@ -359,6 +399,36 @@ mod tests {
         assert!((e.error[0] - (5.0f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
         assert_eq!(e.error[1], 0.0);
         assert_eq!(e.replicates, 4);
+    }
+
+    #[test]
+    fn a_rare_bright_sample_is_not_its_own_excuse() {
+        let rect = Rect::whole([1, 1]);
+        let film = |light: [f64; 4]| {
+            let mut film = Film::new([1, 1], rect, 1);
+            film.put_samples(rect, 0..4, vec![light.map(|y| [y, y, y, y * y])]);
+            film
+        };
+        // Close to each other, both are the textbook standard error: √(5/3 / 4) of 102.5.
+        let near = film([101.0, 102.0, 103.0, 104.0]);
+        for error in [near.relative_error(), near.cautious_error()] {
+            // The floor adds a hundredth to the square below.
+            let expected = (5.0f64 / 3.0 / 4.0).sqrt() / (102.5 * 1.01f64.sqrt());
+            assert!((error.unwrap() / expected - 1.0).abs() < 1e-3, "{error:?}");
+        }
+        // One sample holds nearly all light: beside the mean its deviation is as large as that; beside what the others
+        // say, y = 1 and the floor 2.575, it is 17 times larger. By hand: s² terms 3 · 24.75² / 12 and 74.25² / 12.
+        let far = film([1.0, 1.0, 1.0, 100.0]);
+        let floor = (0.1f64 * 25.75).powi(2);
+        let dim = 3.0 * 24.75f64.powi(2) / 12.0 / (34.0f64.powi(2) + floor);
+        let bright = 74.25f64.powi(2) / 12.0 / (1.0 + floor);
+        let cautious = far.cautious_error().unwrap();
+        assert!(
+            (cautious - (dim + bright).sqrt()).abs() < 1e-12,
+            "{cautious}"
+        );
+        assert!(far.relative_error().unwrap() < 1.0 && cautious > 7.0);
+        assert_eq!(film([0.0; 4]).cautious_error(), Some(0.0));
     }
 
     #[test]
