@@ -53,10 +53,13 @@ impl Comparison {
         for line in self.findings_text().lines() {
             let _ = write!(text, "\n  {line}");
         }
-        text += "\n";
+        if !text.ends_with('\n') {
+            text.push('\n');
+        }
+        text.push('\n');
         text += &metrics(&self.metrics);
         for note in &self.notes {
-            let _ = write!(text, "\nnote: {note}\n");
+            let _ = writeln!(text, "\nnote: {note}");
         }
         text
     }
@@ -81,10 +84,8 @@ fn verdict_sentence(v: &Verdict) -> String {
         } else {
             format!("{:.0e}", v.p)
         };
-        let worst = v.findings.first().map(place).unwrap_or_default();
-        format!(
-            "different, most certainly {worst}: equal pictures look so with probability {p} (limit {alpha})"
-        )
+        let first = v.findings.first().map(place).unwrap_or_default();
+        format!("different {first}: equal pictures look so with probability {p} (limit {alpha})")
     }
 }
 

@@ -96,7 +96,7 @@ pub struct Verdict {
     pub p: f64,
     /// Tests made.
     pub tests: usize,
-    /// What differs, most certain first, at most eight disjoint blocks and the whole picture.
+    /// What differs: the whole picture if it does, then at most eight disjoint blocks, most certain first.
     pub findings: Vec<Finding>,
     /// What would have been seen, from the whole picture to the smallest blocks.
     pub sensitivity: Vec<Sensitivity>,
@@ -273,16 +273,14 @@ fn changes(seen: &mut Vec<f64>, grids: &[Grid], needed: f64) {
 
 /// The findings worth telling: what is certain enough, and of overlapping blocks the most certain one.
 fn pick(all: Vec<Finding>, alpha: f64) -> Vec<Finding> {
+    let certain = all.into_iter().filter(|f| f.p < alpha);
+    let (whole, blocks): (Vec<Finding>, Vec<Finding>) = certain.partition(|f| f.whole);
     let mut kept: Vec<Finding> = Vec::new();
-    for finding in all {
-        if finding.p >= alpha || kept.len() == MOST_FINDINGS {
-            break;
-        }
-        let told =
-            |k: &Finding| k.whole == finding.whole && k.rect.intersection(&finding.rect).is_some();
-        if !kept.iter().any(told) {
+    for finding in blocks {
+        let told = |k: &Finding| k.rect.intersection(&finding.rect).is_some();
+        if kept.len() < MOST_FINDINGS && !kept.iter().any(told) {
             kept.push(finding);
         }
     }
-    kept
+    whole.into_iter().take(1).chain(kept).collect()
 }

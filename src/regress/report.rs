@@ -2,7 +2,7 @@
 
 use super::{Case, Outcome};
 use crate::compare::{Picture, html};
-use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+use std::fmt::Write as _;
 use std::time::Duration;
 
 const TEMPLATE: &str = include_str!("index.html");
@@ -33,36 +33,53 @@ pub fn summary(done: &[Done]) -> String {
 }
 
 /// JUnit XML: a failure for what differs or is new or orphaned, an error for what could not be compared.
-pub fn junit(done: &[Done]) -> Result<String, String> {
-    let mut suite = TestSuite::new("etendue regress");
+pub fn junit(done: &[Done]) -> String {
+    let errors = done.iter().filter(|d| unusable(d)).count();
+    let failures = done.iter().filter(|d| !d.outcome.good()).count() - errors;
+    let time: f64 = done.iter().map(|d| d.time.as_secs_f64()).sum();
+    let counts = format!(
+        "tests=\"{}\" failures=\"{failures}\" errors=\"{errors}\" time=\"{time:.3}\"",
+        done.len()
+    );
+    let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+    let _ = writeln!(xml, "<testsuites {counts}>");
+    let _ = writeln!(xml, "<testsuite name=\"etendue regress\" {counts}>");
     for d in done {
-        let status = match &d.outcome {
-            o if o.good() => TestCaseStatus::success(),
-            o => {
-                let kind = match o {
-                    Outcome::Unusable(_) => NonSuccessKind::Error,
-                    _ => NonSuccessKind::Failure,
-                };
-                let mut status = TestCaseStatus::non_success(kind);
-                status.set_type(o.word().to_lowercase());
-                status.set_message(o.detail(&d.case));
-                if let Outcome::Failed(comparison) = o {
-                    status.set_description(comparison.report());
-                }
-                status
-            }
-        };
-        let mut case = TestCase::new(d.case.name.clone(), status);
-        case.set_classname(d.case.dir.display().to_string());
-        case.set_time(d.time);
+        let detail = xml_text(&d.outcome.detail(&d.case));
+        let _ = writeln!(
+            xml,
+            "<testcase name=\"{}\" classname=\"{}\" time=\"{:.3}\">",
+            xml_text(&d.case.name),
+            xml_text(&d.case.dir.display().to_string()),
+            d.time.as_secs_f64()
+        );
         if d.outcome.good() {
-            case.set_system_out(d.outcome.detail(&d.case));
+            let _ = writeln!(xml, "<system-out>{detail}</system-out>");
+        } else {
+            let element = if unusable(d) { "error" } else { "failure" };
+            let kind = d.outcome.word().to_lowercase();
+            let text = match &d.outcome {
+                Outcome::Failed(comparison) => xml_text(&comparison.report()),
+                _ => String::new(),
+            };
+            let _ = writeln!(
+                xml,
+                "<{element} type=\"{kind}\" message=\"{detail}\">{text}</{element}>"
+            );
         }
-        suite.add_test_case(case);
+        xml += "</testcase>\n";
     }
-    let mut report = Report::new("etendue regress");
-    report.add_test_suite(suite);
-    report.to_string().map_err(|e| e.to_string())
+    xml + "</testsuite>\n</testsuites>\n"
+}
+
+fn unusable(done: &Done) -> bool {
+    matches!(done.outcome, Outcome::Unusable(_))
+}
+
+/// Text for XML, which knows no control characters but tab and line break.
+fn xml_text(text: &str) -> String {
+    let legal = |c: &char| !c.is_control() || matches!(c, '\t' | '\n');
+    html::escape(&text.chars().filter(legal).collect::<String>())
 }
 
 /// One page with all cases; it links the reports of failures by their paths from `base`, the page's folder.

@@ -1,0 +1,248 @@
+//! `etendue regress` and the assertion, on the CPU reference.
+
+use assert_cmd::Command;
+use etendue::engine::Engine;
+use etendue::film::coverage::Rect;
+use etendue::film::{Film, store};
+use etendue::output::{read_exr, write_exr};
+use etendue::provenance::Provenance;
+use etendue::reference::{CpuEngine, Estimator};
+use etendue::regress::assert_golden;
+use etendue::scene::parse::parse_str;
+use etendue::settings::{Overrides, Settings};
+use etendue::world::World;
+use predicates::prelude::PredicateBooleanExt;
+use predicates::str::contains;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+const BALL: &str = r#"
+title = "Ball"
+[camera]
+eye = [0.0, 1.0, 4.0]
+look_at = [0.0, 0.5, 0.0]
+vfov = 40.0
+resolution = [24, 18]
+[material.white]
+type = "diffuse"
+reflectance = [0.8, 0.8, 0.8]
+[[sphere]]
+center = [0.0, 0.5, 0.0]
+radius = 0.5
+material = "white"
+[[plane]]
+point = [0.0, 0.0, 0.0]
+normal = [0.0, 1.0, 0.0]
+material = "white"
+[[light]]
+center = [0.0, 3.0, 1.0]
+normal = [0.0, -1.0, 0.0]
+radius = 0.5
+radiance = [20.0, 20.0, 20.0]
+"#;
+
+/// A folder of scenes.
+struct Folder(TempDir);
+
+impl Folder {
+    fn new(scenes: &[&str]) -> Self {
+        let folder = Self(tempfile::tempdir().expect("a temporary folder"));
+        for name in scenes {
+            folder.put(name, BALL);
+        }
+        folder
+    }
+
+    fn put(&self, name: &str, text: &str) {
+        std::fs::write(self.path(&format!("{name}.toml")), text).expect("written");
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn golden(&self, name: &str) -> PathBuf {
+        self.path("golden").join(name)
+    }
+
+    fn run(&self, flags: &[&str]) -> assert_cmd::assert::Assert {
+        Command::new(assert_cmd::cargo::cargo_bin!("etendue"))
+            .arg("regress")
+            .arg(self.0.path())
+            .args(["--backend", "cpu"])
+            .args(flags)
+            .assert()
+    }
+
+    fn bless(&self) {
+        self.run(&["--bless", "--power", "5%"])
+            .code(0)
+            .stdout(contains("24x18").and(contains("sees a change of all light by")));
+    }
+}
+
+fn render(text: &str, seed: u32, samples: u64) -> (Film, Provenance) {
+    let scene = parse_str(Path::new("ball.toml"), text).expect("legal");
+    let overrides = Overrides {
+        seed: Some(seed),
+        ..Overrides::default()
+    };
+    let settings = Settings::resolve(&scene, &overrides);
+    let world = World::new(&scene, settings.size);
+    let mut engine = CpuEngine::new(world, settings.clone(), Estimator::LightSampling);
+    let rect = Rect::whole(settings.size);
+    let mut film = Film::new(settings.size, rect, settings.strata);
+    engine
+        .render(&mut film, rect, 0..samples, &Default::default())
+        .expect("rendered");
+    let mut provenance = Provenance::new(&scene, text, &settings);
+    provenance.describe(&film);
+    (film, provenance)
+}
+
+#[test]
+fn goldens_are_made_and_pass_with_another_seed() {
+    let f = Folder::new(&["one", "two"]);
+    f.run(&[])
+        .code(1)
+        .stdout(contains("new  one: no ").and(contains("2 scenes: 2 new")));
+    f.bless();
+    let (junit, html) = (f.path("r.xml"), f.path("r.html"));
+    let flags = [
+        "--junit",
+        junit.to_str().unwrap(),
+        "--html",
+        html.to_str().unwrap(),
+        "--jobs",
+        "2",
+    ];
+    f.run(&flags).code(0).stdout(
+        contains("passed  one: the same up to their noise").and(contains("2 scenes: 2 passed")),
+    );
+    let xml = std::fs::read_to_string(junit).expect("written");
+    assert!(
+        xml.contains("tests=\"2\"") && xml.contains("failures=\"0\""),
+        "{xml}"
+    );
+    let page = std::fs::read_to_string(html).expect("written");
+    assert_eq!(page.matches("<img ").count(), 4);
+    assert!(page.contains("2 scenes: 2 passed") && !page.contains("{{"));
+    f.run(&["--filter", "wo"])
+        .code(0)
+        .stdout(contains("1 scenes: 1 passed").and(contains("one").not()));
+    // Enough samples for what was asked, and not many more.
+    let power = |flag: &str| {
+        f.run(&["--bless", "--filter", "one", "--power", flag])
+            .code(0);
+        let picture = read_exr(&f.golden("one.exr")).expect("a golden");
+        picture.samples.expect("counts")[0]
+    };
+    let (rough, fine) = (power("5%"), power("0.5%"));
+    assert!(rough * 3 < fine, "{rough} and {fine} samples");
+}
+
+#[test]
+fn what_differs_leaves_film_and_report() {
+    let f = Folder::new(&["one", "two"]);
+    f.bless();
+    // A golden of the same hash, but of a brighter lamp: the renderer has changed, not the scene.
+    let samples = read_exr(&f.golden("one.exr")).unwrap().samples.unwrap()[0];
+    let (film, _) = render(
+        &BALL.replace("20.0, 20.0, 20.0", "24.0, 24.0, 24.0"),
+        5,
+        samples.into(),
+    );
+    let (_, provenance) = render(BALL, 5, samples.into());
+    write_exr(&f.golden("one.exr"), &film, &provenance).expect("written");
+    let junit = f.path("r.xml");
+    f.run(&["--junit", junit.to_str().unwrap()])
+        .code(1)
+        .stdout(contains("FAILED  one: different in the whole picture"))
+        .stdout(contains("one.report.html").and(contains("--bless --filter one")))
+        .stdout(contains("2 scenes: 1 passed, 1 failed"));
+    let xml = std::fs::read_to_string(junit).expect("written");
+    assert!(
+        xml.contains("failures=\"1\"") && xml.contains("in the whole picture"),
+        "{xml}"
+    );
+    store::load(&f.golden("one.actual.npz")).expect("the actual film");
+    assert!(f.golden("one.report.html").exists() && !f.golden("two.report.html").exists());
+    // Once it passes again, nothing of the failure is left.
+    f.bless();
+    f.run(&[]).code(0);
+    assert!(!f.golden("one.report.html").exists() && !f.golden("one.actual.npz").exists());
+}
+
+#[test]
+fn bad_input_never_passes() {
+    let f = Folder::new(&[]);
+    f.run(&[]).code(2).stderr(contains("nothing to compare"));
+    f.run(&["--bless"])
+        .code(2)
+        .stderr(contains("nothing to compare"));
+    let f = Folder::new(&["ball", "other"]);
+    f.bless();
+    f.run(&["--filter", "cube"])
+        .code(2)
+        .stderr(contains("whose name contains \"cube\""));
+
+    f.put(
+        "ball",
+        &BALL.replace("radius = 0.5\nmaterial", "radius = 0.4\nmaterial"),
+    );
+    f.run(&[])
+        .code(2)
+        .stdout(contains("is of another scene than").and(contains("1 passed, 1 unusable")));
+    f.put("ball", "nonsense");
+    f.run(&[])
+        .code(2)
+        .stdout(contains("unusable  ball").and(contains("ball.toml")));
+    f.put("ball", BALL);
+    std::fs::write(f.golden("ball.exr"), "no picture").expect("written");
+    f.run(&[])
+        .code(2)
+        .stdout(contains("unusable  ball").and(contains("ball.exr")));
+    std::fs::remove_file(f.path("other.toml")).expect("it was there");
+    std::fs::remove_file(f.golden("ball.exr")).expect("it was there");
+    f.run(&[])
+        .code(1)
+        .stdout(contains("new  ball").and(contains("orphaned  other")));
+    Command::new(assert_cmd::cargo::cargo_bin!("etendue"))
+        .args(["regress", "/nowhere"])
+        .assert()
+        .code(4);
+}
+
+#[test]
+fn the_assertion_says_what_differs_and_how_to_bless() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let golden = folder.path().join("ball.exr");
+    let fails = |film: &Film, provenance: &Provenance| {
+        let call = std::panic::AssertUnwindSafe(|| assert_golden(&golden, film, provenance));
+        let panic = std::panic::catch_unwind(call).expect_err("it must not pass");
+        *panic.downcast::<String>().expect("a text")
+    };
+    let (film, provenance) = render(BALL, 1, 256);
+    let text = fails(&film, &provenance);
+    assert!(
+        text.contains("no such file") && text.contains("ETENDUE_BLESS=1"),
+        "{text}"
+    );
+    write_exr(&golden, &film, &provenance).expect("written");
+    let (again, its) = render(BALL, 2, 256);
+    assert_golden(&golden, &again, &its);
+    let brighter = BALL.replace("20.0, 20.0, 20.0", "24.0, 24.0, 24.0");
+    let (wrong, other) = render(&brighter, 3, 256);
+    let text = fails(&wrong, &other);
+    assert!(text.contains("another scene"), "{text}");
+    let text = fails(&wrong, &its);
+    for told in [
+        "different",
+        "in the whole picture",
+        "ball.report.html",
+        "ETENDUE_BLESS=1",
+        "%",
+    ] {
+        assert!(text.contains(told), "{told} is missing: {text}");
+    }
+}
