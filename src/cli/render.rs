@@ -141,7 +141,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     if !args.talk.quiet {
         say_end(&film, &provenance, &tally, reason, &written);
     }
-    warn(&settings, &tally.counters);
+    warn(&settings, &tally.counters, &film);
     saved?;
     match reason {
         StopReason::Interrupted => Err(Failure::Interrupted {
@@ -326,7 +326,7 @@ fn say_end(
 }
 
 /// What the user must know about the picture.
-fn warn(settings: &Settings, counters: &Counters) {
+fn warn(settings: &Settings, counters: &Counters, film: &Film) {
     if counters.truncated > 0 && settings.max_depth_is_default {
         let share = counters.truncated as f64 / counters.paths as f64;
         say!(
@@ -336,6 +336,13 @@ fn warn(settings: &Settings, counters: &Counters) {
             counters.paths,
             percent(share),
             settings.max_depth
+        );
+    }
+    if let Some(tail) = film.heavy_tail().filter(|t| t.unsafe_mean) {
+        say!(
+            "warning: rare bright samples make most of this picture's error (0.1% of its parts carry {} of the mean square), \
+             and it may be larger than stated; more samples will tell",
+            percent(tail.top_share)
         );
     }
     if let Some((x, y, sample)) = counters.first_nonfinite {

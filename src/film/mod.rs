@@ -8,6 +8,7 @@
 //! blocks are folded into f64 here. Neither boundary depends on how the work is cut.
 
 pub mod coverage;
+mod heavy_tail;
 pub mod merge;
 mod npz;
 pub mod store;

@@ -6,6 +6,7 @@ use crate::engine::{Counters, DeviceInfo};
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::provenance::Provenance;
+use crate::stats::tail::Tail;
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::Path;
@@ -43,6 +44,8 @@ pub struct Report {
     pub rays_per_second: Option<f64>,
     /// Of the picture; null while nothing is known.
     pub relative_error: Option<f64>,
+    /// Of the numbers that the error is made of; null while nothing is known.
+    pub heavy_tail: Option<Tail>,
     /// Of the pixels that have samples; null if it is not finite.
     pub mean_luminance: f64,
     /// Paths of this run cut at max_depth.
@@ -119,6 +122,7 @@ impl Report {
             paths_per_second: rate(run.counters.paths),
             rays_per_second: rate(run.counters.rays),
             relative_error: film.relative_error(),
+            heavy_tail: film.heavy_tail(),
             mean_luminance: film.mean_luminance(),
             truncated_paths: run.counters.truncated,
             nonfinite_samples: run.counters.nonfinite,
@@ -197,6 +201,7 @@ mod tests {
             "paths_per_second": 4.0,
             "rays_per_second": 10.0,
             "relative_error": 0.0,
+            "heavy_tail": null,
             "mean_luminance": 0.5,
             "truncated_paths": 1,
             "nonfinite_samples": 0,
@@ -212,6 +217,7 @@ mod tests {
         let r = report(&film, 0.0);
         for key in [
             "relative_error",
+            "heavy_tail",
             "mean_luminance",
             "paths_per_second",
             "rays_per_second",

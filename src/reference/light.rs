@@ -114,6 +114,7 @@ mod tests {
     use super::*;
     use crate::reference::chi_square::{assert_agrees, mean_and_error};
     use crate::reference::disk;
+    use crate::reference::radiosity::form_factor;
     use crate::reference::sampler::Sampler;
     use crate::reference::tracer::Ray;
 
@@ -145,19 +146,6 @@ mod tests {
         disk::intersect(c, n, o, r, light.face, &ray).is_some()
     }
 
-    /// The disk's form factors at (a, h) for a receiver parallel to it and one facing its axis.
-    fn form_factors(a: f64, h: f64, r: f64) -> [f64; 2] {
-        let s = a * a + h * h - r * r;
-        let q = (s * s + 4.0 * h * h * r * r).sqrt();
-        let z = a * a + h * h + r * r;
-        let height = if s > 0.0 {
-            2.0 * h * r * r / (q + s)
-        } else {
-            (q - s) / (2.0 * h)
-        };
-        [h * height / q, 2.0 * h * r * r * a / (q * (z + q))]
-    }
-
     #[test]
     fn closed_forms_have_the_tabulated_values() {
         // The document's table, itself checked against quadrature.
@@ -166,10 +154,10 @@ mod tests {
             (2.0, 1.0, 0.0527864),
             (1.0, 0.2, 0.450248),
         ] {
-            assert!((form_factors(a, h, 1.0)[0] - expected).abs() < 1e-6);
+            assert!((form_factor::disk(a, h, 1.0)[0] - expected).abs() < 1e-6);
         }
-        assert!((form_factors(2.0, 1.0, 1.0)[1] - 0.0854102).abs() < 1e-7);
-        assert!((form_factors(3.0, 0.5, 0.7)[1] - 0.00902827).abs() < 1e-8);
+        assert!((form_factor::disk(2.0, 1.0, 1.0)[1] - 0.0854102).abs() < 1e-7);
+        assert!((form_factor::disk(3.0, 0.5, 0.7)[1] - 0.00902827).abs() < 1e-8);
     }
 
     #[test]
@@ -185,7 +173,7 @@ mod tests {
             (0.3, 1e-4),
         ] {
             let point = DVec3::new(a, -h, 0.0);
-            let expected = form_factors(a, h, 1.0);
+            let expected = form_factor::disk(a, h, 1.0);
             for (receiver, expected) in [DVec3::Y, -DVec3::X].into_iter().zip(expected) {
                 let mut rng = Sampler::new(1, 0, 0);
                 let (mean, error) = mean_and_error(20_000, || {

@@ -15,6 +15,7 @@ pub mod mirror;
 pub mod path;
 pub mod phong;
 pub mod plane;
+pub mod radiosity;
 pub mod sampler;
 pub mod sphere;
 pub mod tracer;

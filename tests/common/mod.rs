@@ -11,6 +11,7 @@ use etendue::reference::{CpuEngine, Estimator};
 use etendue::scene::{Scene, parse};
 use etendue::settings::{Overrides, Settings};
 use etendue::world::World;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -25,6 +26,12 @@ pub fn scene_files() -> Vec<PathBuf> {
     files.sort();
     assert!(!files.is_empty(), "no scenes in {}", dir.display());
     files
+}
+
+/// The scene `scenes/NAME.toml`.
+pub fn named_scene(name: &str) -> Scene {
+    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    read(&dir.join(name).with_extension("toml"))
 }
 
 /// Reads a scene, or says what is wrong with it.
@@ -78,10 +85,16 @@ pub fn cpu(scene: &Scene, settings: &Settings, estimator: Estimator) -> CpuEngin
 pub fn film(engine: &mut dyn Engine, settings: &Settings, spp: u64) -> Film {
     let rect = Rect::whole(settings.size);
     let mut film = Film::new(settings.size, rect, settings.strata);
-    let mut at = 0;
-    while at < spp {
-        let end = ((at / BLOCK + 1) * BLOCK).min(spp);
-        match engine.render(&mut film, rect, at..end, &AtomicBool::new(false)) {
+    add(engine, &mut film, 0..spp);
+    film
+}
+
+/// Adds samples to a film of the whole picture.
+pub fn add(engine: &mut dyn Engine, film: &mut Film, samples: Range<u64>) {
+    let mut at = samples.start;
+    while at < samples.end {
+        let end = ((at / BLOCK + 1) * BLOCK).min(samples.end);
+        match engine.render(film, film.bounds, at..end, &AtomicBool::new(false)) {
             Ok(counters) => assert_eq!(
                 counters.nonfinite, 0,
                 "non-finite samples, first {:?}",
@@ -92,7 +105,6 @@ pub fn film(engine: &mut dyn Engine, settings: &Settings, spp: u64) -> Film {
         }
         at = end;
     }
-    film
 }
 
 /// Means of square blocks of pixels, all channels, then the mean of the whole picture.
