@@ -273,8 +273,8 @@ mod tests {
     #[test]
     fn many_comparisons_may_stray_farther() {
         assert!((sigmas(1) - 4.0).abs() < 1e-9);
-        // Tables of the normal distribution: 6.334e-5 / 1000, two-sided, is 5.4135 standard deviations.
-        assert!((sigmas(1000) - 5.4135).abs() < 2e-3, "{}", sigmas(1000));
+        // By Python's statistics.NormalDist: 6.334e-5 / 1000, two-sided, is 5.4091 standard deviations.
+        assert!((sigmas(1000) - 5.4091).abs() < 1e-4, "{}", sigmas(1000));
     }
 
     #[test]
