@@ -3,8 +3,7 @@
 use super::adapters::WORKGROUP;
 use super::pack::pack;
 use super::{Gpu, scene};
-use crate::kernel::{Access, probe_source, scene_probe_source};
-use crate::settings::Settings;
+use crate::kernel::probe_source;
 use crate::world::World;
 use wgpu::util::DeviceExt as _;
 
@@ -28,11 +27,6 @@ pub fn run(
     Probe::compile(gpu, &probe_source(features, body), false)?.run(gpu, None, inputs)
 }
 
-/// The text of a probe that may call all that the kernel of `world` calls: `intersect`, `occluded` and so on.
-pub fn scene_source(world: &World, settings: &Settings, access: Access, body: &str) -> String {
-    scene_probe_source(world, settings, access, body)
-}
-
 /// A compiled probe.
 pub struct Probe {
     pipeline: wgpu::ComputePipeline,
@@ -42,7 +36,7 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// Compiles `source`; `with_scene` if it is one of [`scene_source`].
+    /// Compiles `source`; `with_scene` if it reads a scene's buffers.
     ///
     /// # Errors
     /// When the module is refused.
@@ -78,8 +72,8 @@ impl Probe {
         }
     }
 
-    /// Runs it once for each of `inputs`. A probe of a scene takes a `world` whose [`scene_source`] is its own: that
-    /// it was compiled for, or with [`Access::Buffers`] another with as many things of the same kinds.
+    /// Runs it once for each of `inputs`. A probe of a scene takes a `world` that would compose the same text: the one
+    /// it was composed for, or, where values are in buffers, another with as many things of the same kinds.
     ///
     /// # Errors
     /// When the device fails.

@@ -183,7 +183,7 @@ pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
     s
 }
 
-/// The same beside all that the kernel of `world` has but its path loop.
+/// The same beside all that the kernel of `world` has but its path loop: `intersect`, `occluded` and so on.
 pub(crate) fn scene_probe_source(
     world: &World,
     settings: &Settings,

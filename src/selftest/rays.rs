@@ -2,8 +2,8 @@
 
 use super::backend::{Backend, Numbers, OpenGpu, Trouble, written};
 use super::build::Build;
-use crate::gpu::probe::{Probe, Values, scene_source};
-use crate::kernel::Access;
+use crate::gpu::probe::{Probe, Values};
+use crate::kernel::{Access, scene_probe_source};
 use crate::reference::{Estimator, Met, Ray, Sampler, Tracer, frame};
 use crate::world::World;
 use glam::DVec3;
@@ -177,7 +177,7 @@ impl<'a> Range<'a> {
     }
 
     fn run(&self, open: &OpenGpu, body: &str, inputs: &[Values]) -> Result<Vec<Numbers>, Trouble> {
-        let source = scene_source(self.world(), self.tracer.settings(), self.access, body);
+        let source = scene_probe_source(self.world(), self.tracer.settings(), self.access, body);
         let mut probes = open.probes.lock().unwrap_or_else(|p| p.into_inner());
         let probe = match probes.get(&source) {
             Some(probe) => probe.clone(),

@@ -77,7 +77,7 @@ fn uniform(b: &Backend) -> Result<Measure, Trouble> {
     Ok(measure("random numbers below 1", &out))
 }
 
-/// Fills y[1..=3] with a direction and y[0] with its density, 0 if it is not above the surface with normal n.
+/// What a body does not set reads 0.
 const CLEAR: &str = "
         for (var i = 0; i < 16; i++) {
             y[i] = 0.0;
