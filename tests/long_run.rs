@@ -58,7 +58,7 @@ fn a_million_samples_say_what_a_thousand_say() {
         assert!(t.abs() < LARGEST_T, "channel {c}: {first:?} {last:?}");
         let relative = last[c].1.sqrt() / last[c].0;
         assert!(
-            relative < 1e-3,
+            relative < 2e-3,
             "channel {c}: too noisy to tell, {relative}"
         );
     }
