@@ -1,5 +1,6 @@
 //! Films and the program, seen from outside.
 
+mod cost;
 mod damage;
 #[cfg(target_os = "linux")]
 mod kill;
