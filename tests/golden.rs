@@ -1,12 +1,14 @@
-//! A few tiny pictures as they should look, for what statistics do not see: orientation, tone curve, colour order.
+//! Pictures as they should look: of every scene up to its noise, and a few as PNG for what statistics do not see:
+//! orientation, tone curve, colour order.
 //! `ETENDUE_BLESS=1 cargo test --release --test golden` makes them anew.
 
 mod common;
 
-use common::{film, gpu, read, settings};
+use common::{film, gpu, read, scene_files, settings};
 use etendue::kernel::Access;
 use etendue::output::write_png;
 use etendue::provenance::Provenance;
+use etendue::regress::{BLESS, assert_golden};
 use image::RgbImage;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +34,7 @@ fn check(name: &str) {
     let actual = folder.path().join("actual.png");
     write_png(&actual, &film, &provenance, 0.0).expect("written");
     let golden = golden(name);
-    if std::env::var_os("ETENDUE_BLESS").is_some() {
+    if std::env::var_os(BLESS).is_some() {
         std::fs::copy(&actual, &golden).expect("golden written");
         return;
     }
@@ -60,6 +62,21 @@ fn check(name: &str) {
         100.0 * moved,
         golden.display()
     );
+}
+
+/// Small enough for 50 KB a golden, with samples enough to see a change of all light by 1.5 % (diffuse) to 6 % (caustic).
+#[test]
+fn every_scene_is_its_golden_up_to_noise() {
+    let blessing = std::env::var_os(BLESS).is_some();
+    for path in scene_files() {
+        let scene = read(&path);
+        // Noise that is shared with the golden is no evidence.
+        let settings = settings(&scene, [48, 36], if blessing { 1 } else { 2 });
+        let film = film(&mut gpu(&scene, &settings, None), &settings, 256);
+        let name = path.file_stem().expect("it has a name").to_string_lossy();
+        let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}.exr"));
+        assert_golden(&golden, &film, &Provenance::new(&scene, "", &settings));
+    }
 }
 
 #[test]
