@@ -272,8 +272,8 @@ pub(crate) mod tests {
             ("shadow_rays is 1 and 2", |p| p.settings.shadow_rays = 2),
             ("seed is 4294967295 and 7", |p| p.settings.seed = 7),
             (
-                "sampler is 1 (of version 0.1.0) and 2 (of version 9)",
-                |p| (p.sampler_version, p.version) = (2, "9".into()),
+                "sampler is 2 (of version 0.1.0) and 3 (of version 9)",
+                |p| (p.sampler_version, p.version) = (3, "9".into()),
             ),
             (
                 "scene is \"Kästchen – \\\"one\\\"\" (0123456789ab) and \"untitled\" (ff)",
