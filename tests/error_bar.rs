@@ -48,7 +48,7 @@ fn check(name: &str, size: [u32; 2]) {
     let reference = pixels(&film(&mut engine, &settings, REFERENCE_SAMPLES));
     let mut of_seeds = [const { Vec::new() }; SAMPLES.len()];
     for seed in 1..=SEEDS {
-        engine.set_seed(seed);
+        engine.reseed(seed);
         let mut film = Film::new(size, Rect::whole(size), settings.strata);
         let mut at = 0;
         for (spp, squares_of) in SAMPLES.into_iter().zip(&mut of_seeds) {

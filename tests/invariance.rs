@@ -68,7 +68,7 @@ fn runs(s: &Scene, first_seed: u32) -> Vec<Vec<[f64; 3]>> {
     let settings = settings(s, SIZE, 0);
     let mut engine = gpu(s, &settings, None);
     let run = |k| {
-        engine.set_seed(first_seed + k);
+        engine.reseed(first_seed + k);
         block_means(&film(&mut engine, &settings, SPP), 5)
     };
     (0..RUNS).map(run).collect()

@@ -196,11 +196,6 @@ impl GpuEngine {
         self.compile_seconds
     }
 
-    /// Other random numbers from here on: kernels do not depend on the seed.
-    pub fn set_seed(&mut self, seed: u32) {
-        self.seed = seed;
-    }
-
     /// The kernel.
     pub fn kernel(&self) -> &Kernel {
         &self.kernel
