@@ -188,6 +188,15 @@ fn faults(size: f64) -> Vec<Fault> {
     let (aside, out) = (0.023 * size, 0.034 * size);
     vec![
         Fault {
+            name: format!("shadow rays that start {out} off their surface"),
+            scene: "diffuse",
+            text: None,
+            kernel: Some((
+                "Ray(v.p, to.d, face",
+                format!("Ray(v.p + {out} * n, to.d, face"),
+            )),
+        },
+        Fault {
             name: format!("{size} % more light from the brighter lamp"),
             scene: "three_materials",
             text: Some(("[20.0, 16.8, 12.6]", format!("{lamp:?}"))),
@@ -210,15 +219,6 @@ fn faults(size: f64) -> Vec<Fault> {
                 format!("ior = 1.52\ntransmittance = [{kept}, {kept}, {kept}]"),
             )),
             kernel: None,
-        },
-        Fault {
-            name: format!("shadow rays that start {out} too far out"),
-            scene: "diffuse",
-            text: None,
-            kernel: Some((
-                "Ray(v.p, to.d, face",
-                format!("Ray(v.p + {out} * to.d, to.d, face"),
-            )),
         },
     ]
 }
