@@ -21,6 +21,9 @@ use std::fmt::Write as _;
 /// Squared, the camera rays that a sample sends in a pixel that may see a light.
 const GLANCES: u32 = 4;
 
+/// Glances at more surfaces would use up the loop trips that an older driver grants.
+const MOST_GLANCED_AT: u64 = 500;
+
 /// Vertices that a path keeps for certain before roulette may end it.
 const ROULETTE_DEPTH: u32 = 5;
 
@@ -109,15 +112,13 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
         "\n// ---- path.wgsl\n\n{}",
         preprocess::run(PATH, &features)
     );
-    let inner = match access {
-        Access::Baked => 0,
-        Access::Buffers => {
-            // Every vertex: nearest hit and shadow rays over all surfaces, light choice over all lights.
-            let rays = 1 + u64::from(settings.shadow_rays);
-            rays * (world.lights.len() + world.primitives.len()) as u64
-                + u64::from(settings.shadow_rays) * world.lights.len() as u64
-        }
+    // Loops over all surfaces for a ray, and over all lights to choose one.
+    let (ray, choice) = match access {
+        Access::Baked => (0, 0),
+        Access::Buffers => (surfaces(world), world.lights.len() as u64),
     };
+    // Every vertex: nearest hit, and for each shadow ray a choice and a ray.
+    let inner = ray + u64::from(settings.shadow_rays) * (choice + ray);
     let shadow_loop = if settings.shadow_rays > 1 {
         u64::from(settings.shadow_rays)
     } else {
@@ -130,13 +131,13 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
         0
     };
     let glances = if features.contains("SEEN_LIGHTS") {
-        u64::from(GLANCES * GLANCES)
+        u64::from(GLANCES * GLANCES) * (1 + ray)
     } else {
         0
     };
-    let trips_per_sample = (u64::from(last_depth(settings)) + glances)
+    let trips_per_sample = u64::from(last_depth(settings))
         .saturating_mul(1 + inner + shadow_loop + hidden)
-        .saturating_add(strata_loop);
+        .saturating_add(glances + strata_loop);
     Kernel {
         wgsl,
         access,
@@ -222,6 +223,11 @@ fn tags(s: &mut String) {
     }
 }
 
+/// Lights and primitives.
+fn surfaces(world: &World) -> u64 {
+    (world.lights.len() + world.primitives.len()) as u64
+}
+
 /// Number of the last vertex that can matter, for the light that is kept.
 fn last_depth(settings: &Settings) -> u32 {
     settings.max_depth.min(needed_depth(settings))
@@ -283,7 +289,9 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     let faces_eye = |l: &WorldLight| l.normal.dot(eye) > l.offset;
     set(
         "SEEN_LIGHTS",
-        settings.light.emitted && world.lights.iter().any(faces_eye),
+        settings.light.emitted
+            && surfaces(world) <= MOST_GLANCED_AT
+            && world.lights.iter().any(faces_eye),
     );
     set("WHITTED", settings.integrator == Integrator::Whitted);
     set("ALL_LIGHT", settings.light == LightParts::ALL);
