@@ -137,12 +137,11 @@ impl Geometry {
             let (height, reach) = (n.dot(center) - offset, size * n.cross(normal).length());
             let slack = COINCIDENT * size;
             let (below, above) = (height + reach <= slack, height - reach >= -slack);
-            let flush = below && above;
+            // Flush, it lies on the side to which it faces.
             let outwards = n.dot(normal) > 0.0;
-            (
-                below && !(flush && outwards),
-                above && !(flush && !outwards),
-            )
+            let (flush_outside, flush_inside) =
+                (below && above && outwards, below && above && !outwards);
+            (below && !flush_outside, above && !flush_inside)
         };
         match *self {
             Self::Sphere { center: c, radius } => {
