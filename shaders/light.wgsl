@@ -32,10 +32,18 @@ fn cap_of(light: DiskLight, p: vec3f) -> Cap {
     let radial = v - light.normal * dot(light.normal, v);
     let a2 = dot(radial, radial);
     let s = a2 + h * h - r2;
-    let q = sqrt(s * s + 4.0 * h * h * r2);
     // (q - s) / 2h = 2 h r^2 / (q + s), and either form cancels on one side of s = 0.
     let far = s > 0.0;
+#if VAST_LIGHTS
+    // The same without fourth powers of lengths, which overflow: q is the product of the distances to the rim's nearest
+    // and farthest point.
+    let a = sqrt(a2);
+    let q = length(vec2f(a - light.radius, h)) * length(vec2f(a + light.radius, h));
+    let height = select((q - s) / max(2.0 * h, TINY), 2.0 * h * (r2 / max(q + s, TINY)), far);
+#else
+    let q = sqrt(s * s + 4.0 * h * h * r2);
     let height = select(q - s, 2.0 * h * r2, far) / max(select(2.0 * h, q + s, far), TINY);
+#endif
     return Cap(v, h, a2, s, q, select(0.0, height, h > 0.0));
 }
 

@@ -21,6 +21,9 @@ use std::fmt::Write as _;
 /// Squared, the camera rays that a sample sends in a pixel that may see a light.
 const GLANCES: u32 = 4;
 
+/// The fourth power of a larger radius comes near the end of f32.
+const VAST_RADIUS: f64 = 1e8;
+
 /// Glances at more surfaces would use up the loop trips that an older driver grants.
 const MOST_GLANCED_AT: u64 = 500;
 
@@ -279,6 +282,10 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     let sampling = depth > 1 && !world.lights.is_empty() && (diffuse || phong);
     set("LIGHT_SAMPLING", sampling);
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
+    set(
+        "VAST_LIGHTS",
+        world.lights.iter().any(|l| l.radius > VAST_RADIUS),
+    );
     set("LIGHT_SCALES", world.light_scales.is_some());
     set("SEVERAL_SHADOW_RAYS", settings.shadow_rays > 1);
     // What a cosine-distributed bounce finds of a light, cap sampling finds as well, unless it is near.
