@@ -6,6 +6,9 @@ use super::{AIR, COINCIDENT, Geometry, Side, WorldLight, WorldPrimitive};
 use crate::scene::Bsdf;
 use glam::DVec3;
 
+/// Times the format's largest radiance this still fits f32. An index of thirty million between eye and light would exceed it.
+const LARGEST_SCALE: f64 = 1e15;
+
 fn is_dielectric(bsdf: &Bsdf) -> bool {
     matches!(bsdf, Bsdf::Dielectric { .. })
 }
@@ -128,11 +131,12 @@ impl Media {
         std::iter::once(1.0).chain(solids).collect()
     }
 
-    /// (n at the eye / n in the medium)² for every medium, air first.
+    /// (n at the eye / n in the medium)² for every medium, air first; at most [`LARGEST_SCALE`].
     pub(super) fn light_scales(&self, eye: u32) -> Vec<f64> {
         let indices = self.indices();
         let n = indices[eye as usize];
-        indices.iter().map(|m| (n / m).powi(2)).collect()
+        let scale = |m: &f64| (n / m).powi(2).min(LARGEST_SCALE);
+        indices.iter().map(scale).collect()
     }
 
     /// The medium that a light shines in; `None` if a surface cuts it, or seems to.
