@@ -1,0 +1,112 @@
+//! What is said, and where.
+
+use crate::program::{Bench, says};
+use predicates::prelude::*;
+use std::fs;
+
+#[test]
+fn help_and_version_are_data() {
+    let bench = Bench::new();
+    bench
+        .run("--version")
+        .success()
+        .stdout(says("etendue "))
+        .stderr("");
+    bench
+        .run("--help")
+        .success()
+        .stdout(says("Examples:"))
+        .stderr("");
+    bench
+        .run("render --help")
+        .success()
+        .stdout(says("Examples:").and(says("multiples of 256")))
+        .stderr("");
+}
+
+#[test]
+fn the_report_on_stdout_has_every_key() {
+    let bench = Bench::new();
+    let done = bench
+        .run("render box.toml --backend cpu --spp 16 --seed 7 --region 1,2,5,6 -o a.png --report - --quiet")
+        .success()
+        .stderr("");
+    let report: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
+    for key in "version scene scene_hash adapter resolution regions seed spp stop_reason seconds paths rays \
+                paths_per_second rays_per_second relative_error heavy_tail mean_luminance truncated_paths nonfinite_samples"
+        .split_whitespace()
+    {
+        assert!(report.get(key).is_some(), "no {key} in {report}");
+    }
+    assert_eq!(report["seed"], 7);
+    assert_eq!(report["spp"], 16);
+    assert_eq!(report["paths"], 16 * 16);
+    assert_eq!(report["stop_reason"], "spp");
+    assert_eq!(report["resolution"], serde_json::json!([24, 16]));
+    assert_eq!(report["regions"], serde_json::json!([[1, 2, 5, 6]]));
+    assert_eq!(report["nonfinite_samples"], 0);
+    assert!(report["relative_error"].as_f64().unwrap() > 0.0);
+    for key in ["compile", "render", "total"] {
+        assert!(report["seconds"][key].is_number(), "seconds.{key}");
+    }
+    for key in ["name", "driver", "backend"] {
+        assert!(report["adapter"][key].is_string(), "adapter.{key}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_has_gone_is_no_failure() {
+    use std::process::{Command, Stdio};
+    let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
+        .arg("schema")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let done = child.wait_with_output().unwrap();
+    assert!(done.status.success(), "{:?}", done.status);
+    assert!(done.stderr.is_empty());
+}
+
+#[test]
+fn check_schema_and_adapters_print_data() {
+    let bench = Bench::new();
+    bench
+        .run("check box.toml")
+        .success()
+        .stdout(says("box.toml: ").and(says("primitives 4, lights 1, materials 3")));
+    let done = bench.run("schema").success().stderr("");
+    let schema: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
+    assert!(schema["properties"]["camera"].is_object());
+    bench
+        .run("adapters")
+        .success()
+        .stdout(says("CPU reference"));
+}
+
+#[test]
+fn the_kernel_can_be_seen_without_an_adapter() {
+    let bench = Bench::new();
+    bench.render("--spp 1 --dump-wgsl kernel.wgsl -o a.png");
+    let wgsl = fs::read_to_string(bench.path("kernel.wgsl")).unwrap();
+    assert!(wgsl.contains("@compute"));
+}
+
+#[test]
+fn lines_of_progress_never_say_all_is_done() {
+    let bench = Bench::new();
+    bench
+        .run("render box.toml --backend cpu --spp 64 --progress plain -o a.png")
+        .success()
+        .stderr(says("100 %").not());
+}
+
+#[test]
+fn a_picture_to_follow_is_left_as_the_last_one() {
+    let bench = Bench::new();
+    bench.render("--spp 4 -o a.png --watch w.png");
+    let (a, w) = (fs::read(bench.path("a.png")), fs::read(bench.path("w.png")));
+    assert_eq!(a.unwrap(), w.unwrap());
+}

@@ -1,0 +1,109 @@
+//! Files that are no scene at all.
+
+use super::FULL;
+use etendue::scene::parse::{MAX_FILE_BYTES, ReadError, read};
+use std::io::ErrorKind;
+use std::path::Path;
+
+#[test]
+fn files_that_cannot_be_read() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let missing = folder.path().join("missing.toml");
+    for (path, kind) in [
+        (missing.as_path(), ErrorKind::NotFound),
+        (folder.path(), ErrorKind::IsADirectory),
+    ] {
+        match read(path) {
+            Err(error @ ReadError::Io { .. }) => {
+                let message = error.to_string();
+                assert!(
+                    message.starts_with(&path.display().to_string()),
+                    "{message}"
+                );
+                let ReadError::Io { source, .. } = error else {
+                    unreachable!("matched above");
+                };
+                assert_eq!(source.kind(), kind);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// The message about a file with this content, without its path.
+fn message_about(content: &[u8]) -> String {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("s.toml");
+    std::fs::write(&path, content).expect("written");
+    let Err(ReadError::Invalid(errors)) = read(&path) else {
+        panic!("{content:?} passes");
+    };
+    let shown = errors[0].to_string();
+    let name = path.display().to_string();
+    shown
+        .strip_prefix(&name)
+        .expect("begins with the path")
+        .to_owned()
+}
+
+#[test]
+fn files_that_are_no_text() {
+    let utf8 = "is not UTF-8, but a scene file is UTF-8 text";
+    assert_eq!(
+        message_about(b"\xff\xfe[\0c\0"),
+        format!(":1:1: byte 0xff {utf8}")
+    );
+    assert_eq!(
+        message_about(b"title = \"x\"\r\n# \xc3\xb6 \xe9t\xe9\n"),
+        format!(":2:5: byte 0xe9 {utf8}")
+    );
+    assert_eq!(
+        message_about(b"\xef\xbb\xbf\xc3"),
+        format!(":1:1: byte 0xc3 {utf8}")
+    );
+    let nul = "a NUL character, but a scene file is TOML text";
+    assert_eq!(message_about(b"title\0 = 1"), format!(":1:6: {nul}"));
+    let png = message_about(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
+    assert_eq!(png, format!(":1:1: byte 0x89 {utf8}"));
+    let zip = message_about(b"PK\x03\x04\x14\x00\x06");
+    assert_eq!(zip, format!(":1:6: {nul}"));
+    assert!(message_about(b"").starts_with(": is empty"));
+}
+
+#[test]
+fn files_of_absurd_size() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("large.toml");
+    let file = std::fs::File::create(&path).expect("created");
+    // Sparse: it takes no room.
+    file.set_len(MAX_FILE_BYTES + 1).expect("grown");
+    let error = read(&path).expect_err("too large").to_string();
+    let expected = "is 67108865 bytes long or longer; a scene file has at most 64 MiB";
+    assert!(error.ends_with(expected), "{error}");
+    assert!(matches!(read(&path), Err(ReadError::Invalid(_))));
+
+    file.set_len(MAX_FILE_BYTES).expect("cut");
+    let error = read(&path).expect_err("NULs").to_string();
+    assert!(
+        error.contains("NUL"),
+        "as large as allowed, and read: {error}"
+    );
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn endless_devices_end() {
+    let error = read(Path::new("/dev/zero"))
+        .expect_err("endless")
+        .to_string();
+    assert!(error.ends_with("at most 64 MiB"), "{error}");
+}
+
+#[test]
+fn a_read_file_knows_its_path() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("full.toml");
+    std::fs::write(&path, FULL).expect("written");
+    let scene = read(&path).expect("valid");
+    assert_eq!(scene.path, path);
+}

@@ -1,0 +1,197 @@
+//! Keys, tables and syntax; how errors are told.
+
+use super::{FULL, errors, one, parse};
+
+#[test]
+fn columns_count_characters() {
+    one(
+        "look_at = [0.0, 1.0, 0.0]",
+        "look_at = [0.0, 1.0, 0.0]\n\"ö\" = 1",
+        "6:1: unknown key \"ö\" in [camera]; allowed: eye, look_at, up, vfov, resolution",
+    );
+    let inline = FULL.replace("[render]", "[x]").replace(
+        "title = \"Everything\"",
+        "title = \"öäü\"\nrender = { \"ß\" = 1, seed = -1 }",
+    );
+    let errors = parse(&inline).expect_err("wrong keys");
+    assert!(
+        errors[0].starts_with("s.toml:2:12: unknown key"),
+        "{errors:?}"
+    );
+    assert!(
+        errors[1].starts_with("s.toml:2:28: seed is -1"),
+        "{errors:?}"
+    );
+}
+
+#[test]
+fn unknown_keys_and_names_get_suggestions() {
+    one(
+        "vfov = 42",
+        "vfov = 42\nlookat = 1",
+        "8:1: unknown key \"lookat\" in [camera]; allowed: eye, look_at, up, vfov, resolution; \
+         did you mean \"look_at\"?",
+    );
+    one(
+        "material = \"glass\"",
+        "material = \"glas\"",
+        "63:12: unknown material \"glas\"; defined here: glass, gloss, steel, white; \
+         did you mean \"glass\"?",
+    );
+    one(
+        "material = \"glass\"",
+        "material = \"velvet\"",
+        "63:12: unknown material \"velvet\"; defined here: glass, gloss, steel, white",
+    );
+    assert_eq!(
+        errors("type = \"mirror\"", "type = \"Miror\"")[0],
+        "s.toml:20:8: unknown material type \"Miror\"; allowed: diffuse, mirror, dielectric, phong; \
+         did you mean \"mirror\"?"
+    );
+    one(
+        "[[disk]]",
+        "[[discs]]",
+        "54:3: unknown key \"discs\" in the scene; allowed: title, camera, render, material, sphere, \
+         plane, disk, cylinder, light; did you mean \"disk\"?",
+    );
+    one(
+        "ior = 1.5",
+        "reflectance = [1, 1, 1]",
+        "24:1: unknown key \"reflectance\" in [material.glass]; allowed: type, ior, transmittance; \
+         it belongs to diffuse and mirror",
+    );
+}
+
+#[test]
+fn missing_keys_and_tables() {
+    one(
+        "radius = 0.125\n",
+        "",
+        "60:1: [[sphere]] lacks radius, which must be a number from 1e-15 to 1e15 \
+         (limits of f32 kernels)",
+    );
+    one(
+        "material = \"glass\"\n",
+        "",
+        "60:1: [[sphere]] lacks material, which must be a string",
+    );
+    one(
+        "type = \"mirror\"\n",
+        "",
+        "19:1: [material.steel] lacks type, which must be a string",
+    );
+    one(
+        "vfov = 42\n",
+        "",
+        "3:1: [camera] lacks vfov, which must be a number above 0 and below 180",
+    );
+
+    let (start, rest) = FULL.split_once("[camera]").expect("a camera");
+    let without_camera = format!("{start}{}", &rest[rest.find("[render]").expect("render")..]);
+    assert_eq!(
+        parse(&without_camera).expect_err("no camera"),
+        ["s.toml: no [camera]: a scene has one"]
+    );
+    let light =
+        &FULL[FULL.find("[[light]]").expect("light")..FULL.find("[[plane]]").expect("plane")];
+    assert_eq!(
+        parse(&FULL.replace(light, "")).expect_err("no light"),
+        ["s.toml: no [[light]]: a scene has at least one, or it is black"]
+    );
+    let bare = &FULL[..FULL.find("[[plane]]").expect("plane")];
+    let no_primitive = [
+        "s.toml: no primitive: a scene has at least one [[sphere]], [[plane]], [[disk]] or [[cylinder]]",
+    ];
+    assert_eq!(parse(bare).expect_err("nothing there"), no_primitive);
+    let empty_array = format!("sphere = []\n{bare}");
+    assert_eq!(
+        parse(&empty_array).expect_err("nothing there"),
+        no_primitive
+    );
+    for empty in ["", "\n\r\n", "# only a comment\n", "\u{feff}"] {
+        assert_eq!(
+            parse(empty).expect_err("empty"),
+            [
+                "s.toml: is empty; a scene has [camera], a [[light]], and a \
+              [[sphere]], [[plane]], [[disk]] or [[cylinder]]"
+            ]
+        );
+    }
+}
+
+#[test]
+fn duplicates_and_syntax() {
+    let once = "a key or [table] stands once; only [[tables]] repeat";
+    one(
+        "vfov = 42",
+        "vfov = 42\nvfov = 43",
+        &format!("8:1: duplicate \"vfov\": {once}"),
+    );
+    one(
+        "[[plane]]",
+        "[render]\n[[plane]]",
+        &format!("38:2: duplicate \"render\": {once}"),
+    );
+    let material = errors("[material.steel]", "[material.white]");
+    assert_eq!(
+        material[0],
+        format!("s.toml:19:11: duplicate \"white\": {once}")
+    );
+    for (old, new, place) in [
+        ("vfov = 42", "vfov = ", "s.toml:7:8: not TOML: "),
+        ("[camera]", "[camera", "s.toml:3:8: not TOML: "),
+        ("\"Everything\"", "\"Everything", "s.toml:1:20: not TOML: "),
+        (
+            "vfov = 42",
+            "vfov 42",
+            "s.toml:7:6: not TOML: key with no value",
+        ),
+    ] {
+        let found = errors(old, new);
+        assert!(found[0].starts_with(place), "{found:?}");
+    }
+    let deep = format!("vfov = {}", "[".repeat(100_000));
+    let found = errors("vfov = 42", &deep);
+    assert!(
+        found[0].contains("recursion") && found.len() < 60,
+        "{}",
+        found[0]
+    );
+    let dotted = format!("[a{}]", ".a".repeat(100_000));
+    assert!(!errors("[render]", &dotted).is_empty());
+}
+
+#[test]
+fn independent_errors_are_all_reported_in_file_order() {
+    let text = FULL
+        .replace("vfov = 42", "vfov = 420")
+        .replace("seed = 7", "sead = 7")
+        .replace("ior = 1.5", "ior = \"high\"")
+        .replace("radius = 0.3", "radius = 0");
+    let errors = parse(&text).expect_err("four errors");
+    let lines: Vec<&str> = errors.iter().filter_map(|e| e.split(':').nth(1)).collect();
+    assert_eq!(lines, ["7", "13", "24", "57"], "{errors:#?}");
+    let many = format!("{FULL}{}", "[[sphere]]\n".repeat(100));
+    let errors = parse(&many).expect_err("300 missing keys");
+    assert_eq!(errors.len(), 51);
+    assert_eq!(errors[50], "s.toml: 250 more errors");
+}
+
+#[test]
+fn messages_are_short_lines_whatever_the_file_holds() {
+    let long = "x".repeat(10_000);
+    for (old, new) in [
+        ("material = \"glass\"", format!("material = \"{long}\"")),
+        ("vfov = 42", format!("vfov = \"\"\"\n{long}\n\"\"\"")),
+        ("vfov = 42", format!("\"\\u001b[31m\\n{long}\" = 1")),
+        (
+            "[material.steel]",
+            format!("[material.\"\\u001b\\n{long}\"]\nx = 1\n[material.steel]"),
+        ),
+    ] {
+        for error in errors(old, &new) {
+            assert!(!error.contains(char::is_control), "{error:?}");
+            assert!(error.chars().count() < 400, "{error}");
+        }
+    }
+}
