@@ -2,7 +2,7 @@
 
 use super::adapters::WORKGROUP;
 use super::pack::{Params, pack};
-use super::tile::Tile;
+use super::tile::{self, Tile};
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
 use crate::film::coverage::Rect;
@@ -130,7 +130,7 @@ impl GpuEngine {
         // SAFETY: without runtime checks the kernel must not index out of bounds or loop for ever. All its
         // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
         // length, or pixels that it compares with the tile's size first; its loops run over constant
-        // ranges, or over samples, each at most max_depth trips long.
+        // ranges, or over samples, each at most max_depth vertices and some glances long.
         let module = unsafe {
             device.create_shader_module_trusted(
                 wgpu::ShaderModuleDescriptor {
@@ -141,7 +141,7 @@ impl GpuEngine {
             )
         };
         let scene_layout = scene::layout(device);
-        let film_layout = film_layout(device);
+        let film_layout = tile::layout(device);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
             bind_group_layouts: &[Some(&scene_layout), Some(&film_layout)],
@@ -425,121 +425,5 @@ fn coprime_stride(groups: u32) -> u32 {
         .unwrap_or(1)
 }
 
-fn film_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty,
-        count: None,
-    };
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("film"),
-        entries: &[
-            entry(
-                0,
-                wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Uniform,
-                    has_dynamic_offset: true,
-                    min_binding_size: None,
-                },
-            ),
-            entry(
-                1,
-                wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2Array,
-                    multisampled: false,
-                },
-            ),
-            entry(
-                2,
-                wgpu::BindingType::StorageTexture {
-                    access: wgpu::StorageTextureAccess::WriteOnly,
-                    format: wgpu::TextureFormat::Rgba32Float,
-                    view_dimension: wgpu::TextureViewDimension::D2Array,
-                },
-            ),
-            entry(
-                3,
-                wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Storage { read_only: false },
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-            ),
-        ],
-    })
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::parse;
-    use crate::settings::Overrides;
-
-    fn engine() -> (GpuEngine, Film, Rect) {
-        let scene = parse::parse_str(
-            "diffuse.toml".as_ref(),
-            include_str!("../../scenes/diffuse.toml"),
-        )
-        .expect("a scene");
-        let flags = Overrides {
-            size: Some([8, 8]),
-            ..Overrides::default()
-        };
-        let settings = Settings::resolve(&scene, &flags);
-        let world = World::new(&scene, settings.size);
-        let engine = GpuEngine::new(&Choice::default(), &world, &settings, None);
-        let rect = Rect {
-            x0: 0,
-            y0: 0,
-            x1: 8,
-            y1: 8,
-        };
-        (
-            engine.expect("an adapter"),
-            Film::new([8, 8], rect, 2),
-            rect,
-        )
-    }
-
-    #[test]
-    fn a_device_lost_between_two_calls_is_an_error_and_leaves_the_film() {
-        let (mut engine, mut film, rect) = engine();
-        let stop = AtomicBool::new(false);
-        engine
-            .render(&mut film, rect, 0..4, &stop)
-            .expect("a live device");
-        let before = film.clone();
-        engine.gpu.device.destroy();
-        let lost = engine.render(&mut film, rect, 4..8, &stop);
-        assert!(matches!(lost, Err(EngineError::Device(_))), "{lost:?}");
-        assert_eq!(film, before);
-    }
-
-    #[test]
-    fn a_tile_that_no_texture_holds_is_an_error() {
-        let (mut engine, ..) = engine();
-        let wide = Rect {
-            x0: 0,
-            y0: 0,
-            x1: 1 << 20,
-            y1: 1,
-        };
-        let problem = engine.prepare_tile(wide).expect_err("wider than a texture");
-        assert!(problem.contains("1048576 x 1"), "{problem}");
-        assert!(engine.prepare_tile(Rect { x1: 8, ..wide }).is_ok());
-    }
-
-    #[test]
-    fn strides_visit_every_group() {
-        for groups in [1, 2, 3, 7, 64, 3072, 16384] {
-            let stride = coprime_stride(groups);
-            let mut seen = vec![false; groups as usize];
-            for g in 0..groups {
-                seen[(u64::from(g) * u64::from(stride) % u64::from(groups)) as usize] = true;
-            }
-            assert!(seen.iter().all(|s| *s), "{groups} groups, stride {stride}");
-        }
-    }
-}
+mod tests;
