@@ -1,39 +1,47 @@
-//! Scenes made in memory.
+//! Scenes made in memory, for the cases and for tests.
 
 use crate::scene::{Bsdf, Camera, Light, Material, Primitive, RenderHints, Scene, Shape};
 use crate::settings::{Overrides, Settings};
 use glam::DVec3;
 
+/// Clear glass of index 1.52 in air.
 pub const GLASS: Bsdf = Bsdf::Dielectric {
     ior: 1.52,
     transmittance: DVec3::ONE,
 };
+/// An air bubble in such glass.
 pub const AIR_IN_GLASS: Bsdf = Bsdf::Dielectric {
     ior: 1.0 / 1.52,
     transmittance: DVec3::ONE,
 };
+/// A mirror that loses nothing.
 pub const MIRROR: Bsdf = Bsdf::Mirror {
     reflectance: DVec3::ONE,
 };
 
+/// A vector.
 pub fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
+/// Diffuse, the same reflectance in every channel.
 pub fn grey(reflectance: f64) -> Bsdf {
     Bsdf::Diffuse {
         reflectance: DVec3::splat(reflectance),
     }
 }
 
+/// A sphere.
 pub fn sphere(center: DVec3, radius: f64) -> Shape {
     Shape::Sphere { center, radius }
 }
 
+/// An infinite plane; `normal` has unit length.
 pub fn plane(point: DVec3, normal: DVec3) -> Shape {
     Shape::Plane { point, normal }
 }
 
+/// A disk; `normal` of any length.
 pub fn disk(center: DVec3, normal: DVec3, radius: f64) -> Shape {
     Shape::Disk {
         center,
@@ -42,6 +50,7 @@ pub fn disk(center: DVec3, normal: DVec3, radius: f64) -> Shape {
     }
 }
 
+/// A capped cylinder between the centres of its caps.
 pub fn cylinder(base: DVec3, top: DVec3, radius: f64) -> Shape {
     Shape::Cylinder { base, top, radius }
 }
@@ -76,11 +85,13 @@ impl Build {
         })
     }
 
+    /// Another size in pixels.
     pub fn size(mut self, width: u32, height: u32) -> Self {
         self.0.camera.resolution = [width, height];
         self
     }
 
+    /// Adds a thing with a material of its own.
     pub fn add(mut self, shape: Shape, bsdf: Bsdf) -> Self {
         self.0.primitives.push(Primitive {
             shape,
@@ -94,10 +105,12 @@ impl Build {
         self
     }
 
+    /// Adds several.
     pub fn add_all(self, things: &[(Shape, Bsdf)]) -> Self {
         things.iter().fold(self, |b, &(s, m)| b.add(s, m))
     }
 
+    /// Adds a disk light; `normal` of any length, `radiance` the same in every channel.
     pub fn light(mut self, center: DVec3, normal: DVec3, radius: f64, radiance: f64) -> Self {
         self.0.lights.push(Light {
             center,

@@ -4,7 +4,7 @@
 //! are those of the project's table of hard cases; L1 and L2 are about rays that leave and touch surfaces.
 
 mod backend;
-mod build;
+pub mod build;
 mod contact;
 mod depth;
 mod furnace;

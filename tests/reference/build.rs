@@ -4,130 +4,40 @@ use etendue::engine::{Counters, Engine};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
 use etendue::reference::{CpuEngine, Estimator, Hit, Ray, Tracer};
-use etendue::scene::{Bsdf, Camera, Light, Material, Primitive, RenderHints, Scene, Shape};
-use etendue::settings::{Overrides, Settings};
+pub use etendue::selftest::build::*;
+use etendue::settings::Settings;
 use etendue::stats::luminance;
 use etendue::world::{AIR, World};
 use glam::DVec3;
 use std::sync::atomic::AtomicBool;
 
-pub const GLASS: Bsdf = Bsdf::Dielectric {
-    ior: 1.52,
-    transmittance: DVec3::ONE,
-};
-pub const MIRROR: Bsdf = Bsdf::Mirror {
-    reflectance: DVec3::ONE,
-};
 pub const BOTH: [Estimator; 2] = [Estimator::LightSampling, Estimator::NoLightSampling];
 
-pub fn v(x: f64, y: f64, z: f64) -> DVec3 {
-    DVec3::new(x, y, z)
+/// A scene of 8 x 6 pixels.
+pub fn small(eye: DVec3, look_at: DVec3, vfov: f64) -> Build {
+    Build::new(eye, look_at, vfov).size(8, 6)
 }
 
-pub fn grey(reflectance: f64) -> Bsdf {
-    Bsdf::Diffuse {
-        reflectance: DVec3::splat(reflectance),
-    }
+/// What is asked of a scene.
+pub trait Ask {
+    fn world(&self) -> World;
+    fn tracer(&self) -> Tracer;
+    /// A whole picture.
+    fn render(&self, settings: &Settings, estimator: Estimator, samples: u64) -> (Film, Counters);
+    /// Mean luminance of the picture, and its standard error.
+    fn measure(&self, estimator: Estimator, samples: u64) -> Measured;
 }
 
-pub fn sphere(center: DVec3, radius: f64) -> Shape {
-    Shape::Sphere { center, radius }
-}
-
-pub fn plane(point: DVec3, normal: DVec3) -> Shape {
-    Shape::Plane { point, normal }
-}
-
-pub fn disk(center: DVec3, normal: DVec3, radius: f64) -> Shape {
-    Shape::Disk {
-        center,
-        normal,
-        radius,
-    }
-}
-
-pub fn cylinder(base: DVec3, top: DVec3, radius: f64) -> Shape {
-    Shape::Cylinder { base, top, radius }
-}
-
-/// A scene under construction.
-#[derive(Clone)]
-pub struct Build(pub Scene);
-
-impl Build {
-    /// Nothing but a camera, 8 x 6 pixels.
-    pub fn new(eye: DVec3, look_at: DVec3, vfov: f64) -> Self {
-        let forward = look_at - eye;
-        let up = if forward.cross(DVec3::Y).length() > 1e-6 * forward.length() {
-            DVec3::Y
-        } else {
-            DVec3::Z
-        };
-        Self(Scene {
-            path: Default::default(),
-            title: None,
-            camera: Camera {
-                eye,
-                look_at,
-                up,
-                vfov,
-                resolution: [8, 6],
-            },
-            render: RenderHints::default(),
-            materials: Vec::new(),
-            primitives: Vec::new(),
-            lights: Vec::new(),
-        })
-    }
-
-    pub fn add(mut self, shape: Shape, bsdf: Bsdf) -> Self {
-        self.0.primitives.push(Primitive {
-            shape,
-            material: self.0.materials.len(),
-            line: 0,
-        });
-        self.0.materials.push(Material {
-            name: String::new(),
-            bsdf,
-        });
-        self
-    }
-
-    pub fn light(mut self, center: DVec3, normal: DVec3, radius: f64, radiance: f64) -> Self {
-        self.0.lights.push(Light {
-            center,
-            normal: normal.normalize(),
-            radius,
-            radiance: DVec3::splat(radiance),
-            line: 0,
-        });
-        self
-    }
-
-    /// One stratum, so that the samples of a pixel are independent and their variance is their own.
-    pub fn settings(&self) -> Settings {
-        Settings {
-            strata: 1,
-            max_depth: 500,
-            ..Settings::resolve(&self.0, &Overrides::default())
-        }
-    }
-
-    pub fn world(&self) -> World {
+impl Ask for Build {
+    fn world(&self) -> World {
         World::new(&self.0, self.0.camera.resolution)
     }
 
-    pub fn tracer(&self) -> Tracer {
+    fn tracer(&self) -> Tracer {
         Tracer::new(self.world(), self.settings(), Estimator::LightSampling)
     }
 
-    /// A whole picture.
-    pub fn render(
-        &self,
-        settings: &Settings,
-        estimator: Estimator,
-        samples: u64,
-    ) -> (Film, Counters) {
+    fn render(&self, settings: &Settings, estimator: Estimator, samples: u64) -> (Film, Counters) {
         let size = settings.size;
         let mut film = Film::new(size, Rect::whole(size), settings.strata);
         let mut engine = CpuEngine::new(World::new(&self.0, size), settings.clone(), estimator);
@@ -139,8 +49,7 @@ impl Build {
         (film, counters)
     }
 
-    /// Mean luminance of the picture, and its standard error.
-    pub fn measure(&self, estimator: Estimator, samples: u64) -> Measured {
+    fn measure(&self, estimator: Estimator, samples: u64) -> Measured {
         let (film, _) = self.render(&self.settings(), estimator, samples);
         measured(&film, Rect::whole(film.size), samples)
     }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use std::sync::atomic::AtomicBool;
 
 fn scene() -> Build {
-    Build::new(v(0.0, 1.0, 5.0), DVec3::ZERO, 40.0)
+    small(v(0.0, 1.0, 5.0), DVec3::ZERO, 40.0)
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5))
         .add(sphere(v(0.0, 0.5, 0.0), 0.5), GLASS)
         .light(v(0.0, 2.0, 0.0), -DVec3::Y, 1.0, 1.0)
@@ -65,8 +65,7 @@ fn regions_and_ranges_give_the_bits_of_the_whole() {
 #[test]
 fn every_replicate_gets_its_rounds() {
     // An eye in front of a light sees 1 in every sample, so the sums count samples.
-    let scene =
-        Build::new(v(0.0, 0.0, 1.0), DVec3::ZERO, 20.0).light(DVec3::ZERO, DVec3::Z, 5.0, 1.0);
+    let scene = small(v(0.0, 0.0, 1.0), DVec3::ZERO, 20.0).light(DVec3::ZERO, DVec3::Z, 5.0, 1.0);
     let settings = Settings {
         strata: 2,
         ..scene.settings()

@@ -25,7 +25,7 @@ fn cornell() -> Build {
     let red = Bsdf::Diffuse {
         reflectance: v(0.7, 0.1, 0.1),
     };
-    let mut scene = Build::new(v(0.0, 1.0, 2.9), v(0.0, 0.9, 0.0), 50.0)
+    let mut scene = small(v(0.0, 1.0, 2.9), v(0.0, 0.9, 0.0), 50.0)
         .add(plane(DVec3::ZERO, DVec3::Y), gloss)
         .add(plane(v(0.0, 2.0, 0.0), -DVec3::Y), grey(0.7))
         .add(plane(v(-1.0, 0.0, 0.0), DVec3::X), red)
@@ -183,13 +183,13 @@ fn emitted_direct_and_indirect_add_up_sample_by_sample() {
 #[test]
 fn depth_counts_the_vertex_on_the_light() {
     // A mirror shows the light at the second vertex; the floor it lights is seen there at the third.
-    let floor = Build::new(v(0.0, 1.0, 5.0), DVec3::ZERO, 5.0)
+    let floor = small(v(0.0, 1.0, 5.0), DVec3::ZERO, 5.0)
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5))
         .light(v(0.0, 2.0, 0.0), -DVec3::Y, 1.0, 1.0);
-    let light = Build::new(v(0.0, 1.0, 0.0), v(0.0, 2.0, 0.0), 5.0)
+    let light = small(v(0.0, 1.0, 0.0), v(0.0, 2.0, 0.0), 5.0)
         .light(v(0.0, 2.0, 0.0), -DVec3::Y, 1.0, 1.0)
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5));
-    let mirrored = Build::new(v(0.0, 1.0, 0.0), DVec3::ZERO, 5.0)
+    let mirrored = small(v(0.0, 1.0, 0.0), DVec3::ZERO, 5.0)
         .add(plane(DVec3::ZERO, DVec3::Y), MIRROR)
         .light(v(0.0, 2.0, 0.0), -DVec3::Y, 1.0, 1.0);
     for estimator in BOTH {
@@ -251,7 +251,7 @@ fn facing_mirrors_lose_a_hundredth_at_each_reflection() {
         reflectance: DVec3::splat(0.99),
     };
     // Each crossing of the gap of width 1 goes 0.1 along; the light at 10.05 is met after 100 reflections.
-    let scene = Build::new(v(0.5, 0.0, 0.0), v(1.5, 0.0, 0.1), 1e-3)
+    let scene = small(v(0.5, 0.0, 0.0), v(1.5, 0.0, 0.1), 1e-3)
         .add(plane(DVec3::ZERO, DVec3::X), dull)
         .add(plane(DVec3::X, -DVec3::X), dull)
         .light(v(0.5, 0.0, 10.0), -DVec3::Z, 2.0, 1.0);

@@ -14,7 +14,7 @@ const PRECISION: [f64; 2] = [0.012, 2e-3];
 
 /// White upper half of a sphere of radius 1 over a light of radiance 1, the eye within.
 fn dome(eye: DVec3, look_at: DVec3) -> Build {
-    Build::new(eye, look_at, 70.0)
+    small(eye, look_at, 70.0)
         .add(sphere(DVec3::ZERO, 1.0), grey(1.0))
         .light(DVec3::ZERO, DVec3::Y, 1.0, 1.0)
 }
@@ -112,7 +112,7 @@ fn no_part_of_the_white_dome_stands_out() {
 
 #[test]
 fn a_chord_at_six_tenths_gives_one_sixth() {
-    let scene = Build::new(v(0.0, 0.0, 0.2), v(0.0, 0.1, -1.0), 60.0)
+    let scene = small(v(0.0, 0.0, 0.2), v(0.0, 0.1, -1.0), 60.0)
         .add(sphere(DVec3::ZERO, 1.0), grey(0.5))
         .light(v(0.0, 0.0, 0.6), -DVec3::Z, 0.8, 1.0);
     for estimator in BOTH {
@@ -127,7 +127,7 @@ fn a_nearly_white_sphere_with_a_small_light_needs_hundreds_of_vertices() {
     let f = 0.01;
     let height = 2.0 * f;
     let radius = (1.0f64 - (1.0 - height) * (1.0 - height)).sqrt();
-    let scene = Build::new(v(0.3, 0.0, 0.2), v(0.0, 0.1, -1.0), 60.0)
+    let scene = small(v(0.3, 0.0, 0.2), v(0.0, 0.1, -1.0), 60.0)
         .add(sphere(DVec3::ZERO, 1.0), grey(0.999))
         .light(v(0.0, 0.0, 1.0 - height), -DVec3::Z, radius, 1.0);
     let expected = 0.999 * f / (1.0 - 0.999 * (1.0 - f));

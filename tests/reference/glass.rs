@@ -13,7 +13,7 @@ const AIR_IN_GLASS: Bsdf = Bsdf::Dielectric {
 
 /// Looks down on a light far below, at almost normal incidence.
 fn through(things: &[(Shape, Bsdf)]) -> Build {
-    let scene = Build::new(v(0.0, 5.0, 0.0), DVec3::ZERO, 0.1);
+    let scene = small(v(0.0, 5.0, 0.0), DVec3::ZERO, 0.1);
     things
         .iter()
         .fold(scene, |scene, &(shape, bsdf)| scene.add(shape, bsdf))
@@ -61,7 +61,7 @@ fn tint_counts_once_per_refraction() {
 
 #[test]
 fn a_light_in_glass_is_seen_at_one_over_n_squared() {
-    let scene = Build::new(v(0.0, 3.0, 0.0), DVec3::ZERO, 0.1)
+    let scene = small(v(0.0, 3.0, 0.0), DVec3::ZERO, 0.1)
         .add(sphere(DVec3::ZERO, 1.0), GLASS)
         .light(DVec3::ZERO, DVec3::Y, 0.5, 1.0);
     // Inside, what is reflected at normal incidence comes back to the light, which reflects nothing.
@@ -79,7 +79,7 @@ fn a_light_in_glass_is_seen_at_one_over_n_squared() {
 
 #[test]
 fn glass_resting_on_the_floor_has_a_gap_of_no_width() {
-    let scene = Build::new(v(0.0, 3.0, 5.0), DVec3::ZERO, 40.0)
+    let scene = small(v(0.0, 3.0, 5.0), DVec3::ZERO, 40.0)
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5))
         .add(cylinder(DVec3::ZERO, DVec3::Y, 0.5), GLASS)
         .light(v(0.0, 4.0, 0.0), -DVec3::Y, 1.0, 1.0);
@@ -135,7 +135,7 @@ fn stacked_rods_are_crossed_one_after_the_other() {
 fn total_reflection_keeps_light_in_a_rod() {
     // Light that comes in through the end at right angles across a gap leaves no ray for an eye beside the rod:
     // for n² >= 2 whatever enters through the end is totally reflected by the side.
-    let scene = Build::new(v(0.0, 0.0, 4.0), DVec3::ZERO, 10.0)
+    let scene = small(v(0.0, 0.0, 4.0), DVec3::ZERO, 10.0)
         .add(cylinder(v(-1.0, 0.0, 0.0), v(1.0, 0.0, 0.0), 0.5), GLASS)
         .light(v(-1.2, 0.0, 0.0), DVec3::X, 0.3, 100.0);
     for estimator in BOTH {
@@ -154,7 +154,7 @@ fn nested_solids_know_their_parents_in_any_order() {
     for order in [[0, 1, 2, 3, 4], [4, 3, 2, 1, 0], [2, 4, 0, 3, 1]] {
         let world = order
             .iter()
-            .fold(Build::new(v(0.0, 9.0, 0.0), DVec3::ZERO, 40.0), |b, &i| {
+            .fold(small(v(0.0, 9.0, 0.0), DVec3::ZERO, 40.0), |b, &i| {
                 b.add(all[i], GLASS)
             })
             .light(v(0.0, 8.0, 0.0), -DVec3::Y, 1.0, 1.0)

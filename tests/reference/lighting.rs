@@ -28,7 +28,7 @@ fn a_floor_under_a_disk_light_has_the_closed_form_irradiance() {
         (3.0, 0.5, 0.7),
     ] {
         // Nearly a single point of the floor, seen from the side.
-        let scene = Build::new(v(a, 0.1, 5.0), v(a, 0.0, 0.0), 1e-4)
+        let scene = small(v(a, 0.1, 5.0), v(a, 0.0, 0.0), 1e-4)
             .add(plane(DVec3::ZERO, DVec3::Y), grey(0.6))
             .light(v(0.0, h, 0.0), -DVec3::Y, r, 2.0);
         let expected = 0.6 * 2.0 * form_factors(a, h, r)[0];
@@ -43,7 +43,7 @@ fn a_floor_under_a_disk_light_has_the_closed_form_irradiance() {
 fn a_wall_beside_a_disk_light_has_the_closed_form_irradiance() {
     // The light's plane cuts the wall's hemisphere; while the whole disk is in front of the wall nothing is lost.
     for (a, h, r) in [(2.0, 1.0, 1.0), (3.0, 0.5, 0.7)] {
-        let scene = Build::new(v(0.5, -h, 5.0), v(a, -h, 0.0), 1e-4)
+        let scene = small(v(0.5, -h, 5.0), v(a, -h, 0.0), 1e-4)
             .add(plane(v(a, 0.0, 0.0), -DVec3::X), grey(0.6))
             .light(DVec3::ZERO, -DVec3::Y, r, 2.0);
         let expected = 0.6 * 2.0 * form_factors(a, h, r)[1];
@@ -54,8 +54,8 @@ fn a_wall_beside_a_disk_light_has_the_closed_form_irradiance() {
 
 #[test]
 fn many_shadow_rays_and_many_lights_give_the_sum() {
-    let mut scene = Build::new(v(0.0, 0.1, 5.0), DVec3::ZERO, 1e-4)
-        .add(plane(DVec3::ZERO, DVec3::Y), grey(1.0));
+    let mut scene =
+        small(v(0.0, 0.1, 5.0), DVec3::ZERO, 1e-4).add(plane(DVec3::ZERO, DVec3::Y), grey(1.0));
     let mut expected = 0.0;
     for (x, h, r, le) in [
         (0.5, 1.0, 0.5, 1.0),
@@ -80,7 +80,7 @@ fn many_shadow_rays_and_many_lights_give_the_sum() {
 #[test]
 fn a_light_is_seen_as_its_radiance_in_front_and_black_behind() {
     for (side, expected) in [(1.0, 7.0), (-1.0, 0.0)] {
-        let scene = Build::new(v(0.0, 0.0, 3.0 * side), DVec3::ZERO, 5.0)
+        let scene = small(v(0.0, 0.0, 3.0 * side), DVec3::ZERO, 5.0)
             .light(DVec3::ZERO, DVec3::Z, 1.0, 7.0)
             // Something bright beyond the black back.
             .light(v(0.0, 0.0, 4.0), -DVec3::Z, 0.5, 100.0);
@@ -96,7 +96,7 @@ fn a_light_is_seen_as_its_radiance_in_front_and_black_behind() {
 
 #[test]
 fn no_light_behind_a_light_and_none_in_its_plane() {
-    let scene = Build::new(v(0.0, 0.5, 5.0), DVec3::ZERO, 10.0)
+    let scene = small(v(0.0, 0.5, 5.0), DVec3::ZERO, 10.0)
         .add(plane(DVec3::ZERO, DVec3::Y), grey(1.0))
         .light(v(0.0, 1.0, 0.0), DVec3::Y, 1.0, 100.0)
         .light(v(3.0, 0.0, 0.0), DVec3::Y, 1.0, 100.0);
@@ -108,7 +108,7 @@ fn no_light_behind_a_light_and_none_in_its_plane() {
 #[test]
 fn closed_walls_do_not_leak() {
     let eye = v(0.3, 0.2, 0.9);
-    let mut room = Build::new(eye, DVec3::ZERO, 100.0);
+    let mut room = small(eye, DVec3::ZERO, 100.0);
     for n in [DVec3::X, DVec3::Y, DVec3::Z] {
         for n in [n, -n] {
             room = room.add(plane(-n, n), grey(0.9));
@@ -131,7 +131,7 @@ fn closed_walls_do_not_leak() {
 
 #[test]
 fn a_flush_light_is_wholly_visible_and_lights_the_room() {
-    let scene = Build::new(v(0.0, 0.5, 0.0), DVec3::Y, 90.0)
+    let scene = small(v(0.0, 0.5, 0.0), DVec3::Y, 90.0)
         .add(plane(DVec3::Y, -DVec3::Y), grey(0.5))
         .add(disk(v(0.1, 1.0, 0.0), DVec3::Y, 0.7), grey(0.2))
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5))
@@ -160,7 +160,7 @@ fn a_flush_light_is_wholly_visible_and_lights_the_room() {
 
 #[test]
 fn where_coplanar_lights_overlap_the_first_is_seen_by_both_estimators() {
-    let scene = Build::new(v(0.0, 0.4, 5.0), DVec3::ZERO, 1e-3)
+    let scene = small(v(0.0, 0.4, 5.0), DVec3::ZERO, 1e-3)
         .add(plane(DVec3::ZERO, DVec3::Y), grey(1.0))
         .light(v(0.0, 1.0, 0.0), -DVec3::Y, 0.5, 1.0)
         .light(v(0.0, 1.0, 0.0), -DVec3::Y, 1.0, 3.0)
@@ -177,7 +177,7 @@ fn where_coplanar_lights_overlap_the_first_is_seen_by_both_estimators() {
 fn the_umbra_is_black_and_outside_the_shadow_nothing_is_lost() {
     // A ball of radius 0.5 at height 1 between the floor and a light of radius 0.2 at height 3.
     let floor_at = |x: f64| {
-        Build::new(v(x, 0.1, 5.0), v(x, 0.0, 0.0), 1e-4)
+        small(v(x, 0.1, 5.0), v(x, 0.0, 0.0), 1e-4)
             .add(plane(DVec3::ZERO, DVec3::Y), grey(1.0))
             .add(sphere(v(0.0, 1.0, 0.0), 0.5), grey(0.0))
             .light(v(0.0, 3.0, 0.0), -DVec3::Y, 0.2, 10.0)

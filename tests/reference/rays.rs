@@ -7,7 +7,7 @@ use etendue::world::{AIR, Geometry};
 use glam::DVec3;
 
 fn scene_of(eye: DVec3, things: &[(Shape, Bsdf)]) -> Build {
-    let scene = Build::new(eye, eye + v(0.3, 0.1, 1.0), 60.0);
+    let scene = small(eye, eye + v(0.3, 0.1, 1.0), 60.0);
     things
         .iter()
         .fold(scene, |scene, &(shape, bsdf)| scene.add(shape, bsdf))
@@ -111,7 +111,7 @@ fn convex_things_left_from_outside_are_not_met_again() {
 #[test]
 fn coincident_faces_are_met_as_light_disk_cap_plane() {
     // One place on the plane y = 0 each for the plane alone, then one more face on top of the others.
-    let scene = Build::new(v(0.0, 3.0, 0.0), v(0.0, 0.0, 0.1), 60.0)
+    let scene = small(v(0.0, 3.0, 0.0), v(0.0, 0.0, 0.1), 60.0)
         .add(sphere(v(0.0, -5.0, 0.0), 5.0), grey(0.5))
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5))
         .add(disk(v(0.0, 1e-12, 0.0), -DVec3::Y, 2.0), grey(0.5))
