@@ -62,7 +62,7 @@ fn check(name: &str, size: [u32; 2]) {
         let (ratio, error) = ratio(squares);
         let text = format!("{name}, {spp} samples: true / stated error = {ratio:.3} ± {error:.3}");
         println!("{text}");
-        if !(0.9 - 2.0 * error..=1.1 + 2.0 * error).contains(&ratio) || error > 0.06 {
+        if !(0.9..=1.1).contains(&ratio) || error > 0.05 {
             wrong += &(text + "\n");
         }
     }

@@ -145,7 +145,7 @@ const MANY_LIGHTS: Case = Case {
 const CAUSTIC: Case = Case {
     name: "caustic",
     size: [32, 24],
-    target: 0.08,
+    target: 0.1,
     reference: 60_000,
 };
 
