@@ -21,7 +21,8 @@ struct Params {
 // Running sums of the block, a layer for each replicate: R, G, B, squared luminance.
 @group(1) @binding(1) var running_in: texture_2d_array<f32>;
 @group(1) @binding(2) var running_out: texture_storage_2d_array<rgba32float, write>;
-// For each pixel of the tile: rays, truncated paths, non-finite samples, 1 + number of the first of those.
+// For each pixel of the tile: rays; truncated paths, and in the upper half 1 + the place in its block of the first sample
+// that was not finite; how many of those replicates 0 and 1 had, in a half each; and replicates 2 and 3.
 @group(1) @binding(3) var<storage, read_write> counters: array<vec4u>;
 
 struct Path {
@@ -186,8 +187,11 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
                 let bounded = min(y, 1.0e15);
                 sum += vec4f(l, bounded * bounded);
             } else {
-                count.w = select(count.w, s + 1u, count.z == 0u);
-                count.z += 1u;
+                let at = s % BLOCK + 1u;
+                count.y |= select(0u, at << 16u, count.y < 0x10000u);
+                let one = 1u << (16u * (params.replicate % 2u));
+                count.z += select(0u, one, params.replicate < 2u);
+                count.w += select(one, 0u, params.replicate < 2u);
             }
             i += 1u;
             s = sample_number(i, params.replicate);

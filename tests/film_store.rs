@@ -8,7 +8,8 @@ use etendue::film::{Film, REPLICATES};
 use etendue::output::FileError;
 use etendue::provenance::Provenance;
 use output_support::{
-    Random, described, forge, negate_first_count, region_film, render, seen_from_python, whole_film,
+    Random, described, forge, forge_bytes, negate_first_count, region_film, render,
+    seen_from_python, whole_film,
 };
 use serde_json::json;
 use std::fs;
@@ -34,7 +35,10 @@ fn refused(path: &Path, bytes: &[u8]) -> String {
 #[test]
 fn a_film_comes_back_and_goes_on_with_the_same_bits() {
     let dir = tempfile::tempdir().unwrap();
-    for film in [whole_film(), region_film()] {
+    let mut lacking = whole_film();
+    lacking.leave_out(3, 1, [1, 0, 2, 0]);
+    lacking.leave_out(0, 2, [0, 1, 0, 0]);
+    for film in [whole_film(), region_film(), lacking] {
         let (path, provenance) = saved(dir.path(), &film);
         let (mut back, back_provenance) = load(&path).unwrap();
         assert_eq!(back_provenance, provenance);
@@ -308,4 +312,33 @@ fn a_small_file_that_claims_to_be_huge_is_refused_at_once() {
     forge(&mut bytes, "\"x1\":6,\"y1\":4", "\"x1\":7,\"y1\":4");
     let text = refused(&path, &bytes);
     assert!(text.contains("array \"counts\" has"), "{text}");
+}
+
+#[test]
+fn samples_left_out_must_fit_the_film() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut film = whole_film();
+    film.leave_out(3, 1, [1, 0, 2, 0]);
+    let (path, _) = saved(dir.path(), &film);
+    let good = fs::read(&path).unwrap();
+    // The last row of the last array is x = 3, y = 1, and its counts; a few bytes of the directory follow it.
+    let row: Vec<u8> = [3u64, 1, 1, 0, 2, 0]
+        .iter()
+        .flat_map(|n| n.to_le_bytes())
+        .collect();
+    for (changed, says) in [
+        ([300u64, 1, 1, 0, 2, 0], "names pixel (300, 1) out of place"),
+        ([3, 1, u64::MAX, 0, 2, 0], "more samples than there can be"),
+        (
+            [3, 1, 1 << 40, 0, 2, 0],
+            "pixel (3, 1) leaves out more samples than it has",
+        ),
+        ([3, 1, 0, 0, 2, 0], "pixel (3, 1) counts"),
+    ] {
+        let mut bytes = good.clone();
+        let new: Vec<u8> = changed.iter().flat_map(|n| n.to_le_bytes()).collect();
+        forge_bytes(&mut bytes, &row, &new);
+        let text = refused(&path, &bytes);
+        assert!(text.contains(says), "{text}");
+    }
 }

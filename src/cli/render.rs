@@ -347,7 +347,7 @@ fn warn(settings: &Settings, counters: &Counters, film: &Film) {
     }
     if let Some((x, y, sample)) = counters.first_nonfinite {
         say!(
-            "warning: {} samples were not finite and count as 0, the first at pixel {x}, {y}, sample {sample}; \
+            "warning: {} samples were not finite and are left out, the first at pixel {x}, {y}, sample {sample}; \
              this is a bug, please report the scene",
             counters.nonfinite
         );

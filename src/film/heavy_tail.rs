@@ -18,13 +18,14 @@ impl Film {
         }
         let mut moments = Vec::new();
         for (rect, ranges) in self.coverage.cells() {
-            let counts = replicate_counts(ranges, self.strata);
-            if counts.iter().filter(|&&n| n > 0).count() < 2 {
-                return None;
-            }
+            let given = replicate_counts(ranges, self.strata);
             for y in rect.y0..rect.y1 {
                 for x in rect.x0..rect.x1 {
                     let sums = self.total(x, y);
+                    let counts = self.left_out.remaining(x, y, &given);
+                    if counts.iter().filter(|&&n| n > 0).count() < 2 {
+                        return None;
+                    }
                     for r in (0..REPLICATES).filter(|&r| counts[r] > 0) {
                         let others = (0..REPLICATES).filter(|&o| o != r);
                         let samples: u64 = others.clone().map(|o| counts[o]).sum();

@@ -90,6 +90,7 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
             into.coverage.add(rect, samples.clone());
         }
     }
+    into.left_out.merge(&other.left_out);
     Ok(())
 }
 
@@ -284,6 +285,18 @@ mod tests {
                 assert!(holes(&sum).is_empty());
             }
         }
+    }
+
+    #[test]
+    fn samples_left_out_of_either_are_left_out_of_both() {
+        let whole = Rect::whole(SIZE);
+        let (mut sum, mut other) = (rendered(whole, 0..256), rendered(whole, 256..512));
+        sum.leave_out(1, 2, [1, 0, 0, 0]);
+        other.leave_out(1, 2, [2, 0, 0, 5]);
+        other.leave_out(4, 0, [0, 1, 0, 0]);
+        merge(&mut sum, &other).unwrap();
+        let expected = [(4, 0, [0, 1, 0, 0]), (1, 2, [3, 0, 0, 5])];
+        assert_eq!(sum.left_out().iter().collect::<Vec<_>>(), expected);
     }
 
     #[test]

@@ -9,12 +9,14 @@
 
 pub mod coverage;
 mod heavy_tail;
+mod left_out;
 pub mod merge;
 mod npz;
 pub mod store;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};
+pub use left_out::LeftOut;
 use std::mem::take;
 use std::ops::Range;
 
@@ -42,6 +44,8 @@ pub struct Film {
     sums: Vec<[Sums<f64>; REPLICATES]>,
     /// Running f32 sums of unfinished blocks, in the same order; empty when there are none.
     partial: Vec<[Sums<f32>; REPLICATES]>,
+    /// Samples that `coverage` has and no sum has.
+    left_out: LeftOut,
 }
 
 /// What a pixel says.
@@ -68,6 +72,7 @@ impl Film {
             coverage: Coverage::default(),
             sums: vec![Default::default(); pixels],
             partial: Vec::new(),
+            left_out: LeftOut::default(),
         }
     }
 
@@ -90,6 +95,7 @@ impl Film {
             coverage,
             sums,
             partial,
+            left_out: LeftOut::default(),
         }
     }
 
@@ -177,6 +183,18 @@ impl Film {
         self.coverage.add(rect, samples);
     }
 
+    /// Takes `samples` of each replicate of pixel (x, y), which were given with its sums, for not there: they were not
+    /// finite, and their share of the sums is 0.
+    pub fn leave_out(&mut self, x: u32, y: u32, samples: [u64; REPLICATES]) {
+        debug_assert!(self.bounds.contains(x, y));
+        self.left_out.add(x, y, samples);
+    }
+
+    /// Samples that were not finite.
+    pub fn left_out(&self) -> &LeftOut {
+        &self.left_out
+    }
+
     /// Finished and unfinished sums of a pixel together.
     pub fn total(&self, x: u32, y: u32) -> [Sums<f64>; REPLICATES] {
         let i = self.index(x, y);
@@ -187,14 +205,14 @@ impl Film {
         total
     }
 
-    /// What pixel (x, y) says, given its sample numbers (from [`Film::coverage`]).
+    /// What pixel (x, y) says, given how many samples of each replicate [`Film::coverage`] has of it.
     ///
     /// With R >= 2 replicates of n_r samples and mean m_r, the squared standard error of the mean m of all n
     /// samples is Σ n_r (m_r - m)² / ((R - 1) n). With a single replicate the samples' own second moment
     /// stands in: √(Σ Y²)/n for the luminance, shared among the channels in proportion to their
     /// means. It is never too small on average (E Y² >= Var Y) and says so by `replicates` = 1.
     pub fn estimate(&self, x: u32, y: u32, counts: &[u64; REPLICATES]) -> Estimate {
-        estimate(&self.total(x, y), counts)
+        estimate(&self.total(x, y), &self.left_out.remaining(x, y, counts))
     }
 
     /// Calls `f(x, y, estimate)` for every pixel of the film that has samples.
@@ -249,6 +267,7 @@ impl Film {
             let counts = replicate_counts(ranges, self.strata);
             for y in rect.y0..rect.y1 {
                 for x in rect.x0..rect.x1 {
+                    let counts = self.left_out.remaining(x, y, &counts);
                     sum += cautious_square(&self.total(x, y), &counts, floor);
                 }
             }
@@ -269,14 +288,21 @@ impl Film {
 
     /// The smallest and largest number of replicates behind any pixel's error; (0, 0) for an empty film.
     pub fn replicates(&self) -> (u32, u32) {
-        let of = |ranges| {
-            replicate_counts(ranges, self.strata)
-                .iter()
-                .filter(|&&n| n > 0)
-                .count() as u32
+        let (mut fewest, mut most) = (u32::MAX, 0);
+        let mut see = |counts: &[u64; REPLICATES]| {
+            let n = counts.iter().filter(|&&n| n > 0).count() as u32;
+            (fewest, most) = (fewest.min(n), most.max(n));
         };
-        let all = || self.coverage.cells().map(|(_, ranges)| of(ranges));
-        (all().min().unwrap_or(0), all().max().unwrap_or(0))
+        for (rect, ranges) in self.coverage.cells() {
+            let counts = replicate_counts(ranges, self.strata);
+            see(&counts);
+            for (x, y, _) in self.left_out.iter() {
+                if rect.contains(x, y) {
+                    see(&self.left_out.remaining(x, y, &counts));
+                }
+            }
+        }
+        (fewest.min(most), most)
     }
 }
 
@@ -438,6 +464,37 @@ mod tests {
         let e = estimate(&sums, &[1, 0, 0, 0]);
         assert_eq!(e.replicates, 1);
         assert!((e.error[3] - 1.0).abs() < 1e-12 && (e.error[0] - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn samples_left_out_are_in_no_count() {
+        let rect = Rect::whole([2, 1]);
+        let light = [
+            [2.0, 2.0, 2.0, 4.0],
+            [4.0, 4.0, 4.0, 16.0],
+            [0.0; 4],
+            [6.0, 6.0, 6.0, 36.0],
+        ];
+        let mut film = Film::new([2, 1], rect, 1);
+        film.put_samples(rect, 0..4, vec![light; 2]);
+        film.leave_out(1, 0, [0, 0, 1, 0]);
+        let counts = replicate_counts(&[0..4], 1);
+        let [whole, three] = [0, 1].map(|x| film.estimate(x, 0, &counts));
+        assert_eq!(
+            (whole.mean[0], whole.samples, whole.replicates),
+            (3.0, 4, 4)
+        );
+        assert_eq!(
+            (three.mean[0], three.samples, three.replicates),
+            (4.0, 3, 3)
+        );
+        // Textbook: three values 2, 4, 6 of variance 4.
+        assert!((three.error[3] - (4.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!(film.replicates(), (3, 4));
+        // A pixel with nothing left has no light, and no error that anyone could know.
+        film.leave_out(0, 0, [1; 4]);
+        assert_eq!(film.estimate(0, 0, &counts), Estimate::default());
+        assert_eq!(film.relative_error(), None);
     }
 
     #[test]

@@ -3,9 +3,10 @@
 //! | array | type, shape | holds |
 //! |---|---|---|
 //! | `provenance` | `\|S`, one item | JSON: format and its version, size, bounds, coverage, [`Provenance`] |
-//! | `counts` | u64 (h, w) | samples of each pixel |
+//! | `counts` | u64 (h, w) | samples of each pixel, without those left out |
 //! | `sums` | f64 (h, w, 4 replicates, 4) | R, G, B, and luminance², over finished blocks |
 //! | `partial` | f32 (h, w, 4 replicates, 4) | the same over an unfinished block; only there while one is |
+//! | `left_out` | u64 (n, 2 + 4 replicates) | pixels x, y with samples that were not finite, and how many of each replicate; only there if there are any |
 //!
 //! h and w are those of `bounds`. In Python:
 //! `f = numpy.load("x.npz"); json.loads(f["provenance"].item())`, and a pixel's mean is
@@ -43,6 +44,9 @@ struct Header {
     replicates: usize,
     block: u64,
     partial: bool,
+    /// Rows of the array `left_out`.
+    #[serde(default)]
+    left_out: u64,
     coverage: Coverage,
     provenance: Provenance,
 }
@@ -57,6 +61,7 @@ struct Kind {
 /// Saves a film: the file is whole or as it was.
 pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), FileError> {
     let unfinished = film.partial().iter().flatten().flatten().any(|&x| x != 0.0);
+    let left_out = film.left_out().rows();
     let header = Header {
         format: FORMAT.into(),
         format_version: FORMAT_VERSION,
@@ -66,6 +71,7 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         replicates: REPLICATES,
         block: BLOCK,
         partial: unfinished,
+        left_out: left_out.len() as u64,
         coverage: film.coverage.clone(),
         provenance: provenance.clone(),
     };
@@ -76,6 +82,10 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         )
     })?;
     let counts = counts(&film.coverage, film.bounds)
+        .and_then(|mut counts| {
+            subtract(&mut counts, film.bounds, &left_out)?;
+            Ok(counts)
+        })
         .map_err(|e| FileError::content(path, format!("inconsistent film: {e}")))?;
     let [height, width] = [film.bounds.height(), film.bounds.width()].map(u64::from);
     let per_replicate = vec![height, width, REPLICATES as u64, 4];
@@ -105,6 +115,14 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
             descr: "<f4".into(),
             shape: per_replicate,
             data: bytemuck::cast_slice(film.partial()),
+        });
+    }
+    if !left_out.is_empty() {
+        arrays.push(Array {
+            name: "left_out",
+            descr: "<u8".into(),
+            shape: vec![left_out.len() as u64, 2 + REPLICATES as u64],
+            data: bytemuck::cast_slice(&left_out),
         });
     }
     atomic::replace(path, |file| npz::write(file, &arrays))
@@ -182,8 +200,23 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     let [height, width] = [header.bounds.height(), header.bounds.width()].map(u64::from);
     let per_replicate = [height, width, REPLICATES as u64, 4];
     let stored: Vec<u64> = reader.array("counts", "<u8", &[height, width], pixels)?;
+    let sums: Vec<[Sums<f64>; REPLICATES]> = reader.array("sums", "<f8", &per_replicate, pixels)?;
+    let partial: Vec<[Sums<f32>; REPLICATES]> = if header.partial {
+        reader.array("partial", "<f4", &per_replicate, pixels)?
+    } else {
+        Vec::new()
+    };
+    let left_out: Vec<[u64; 2 + REPLICATES]> = if header.left_out > 0 {
+        let shape = [header.left_out, 2 + REPLICATES as u64];
+        reader.array("left_out", "<u8", &shape, header.left_out)?
+    } else {
+        Vec::new()
+    };
+    reader.finish()?;
+
     // Only now is it known that the file is as large as the bounds say.
-    let counts = counts(&header.coverage, header.bounds).map_err(Damage::Wrong)?;
+    let mut counts = counts(&header.coverage, header.bounds).map_err(Damage::Wrong)?;
+    subtract(&mut counts, header.bounds, &left_out).map_err(Damage::Wrong)?;
     if let Some(i) = (0..counts.len()).find(|&i| counts[i] != stored[i]) {
         return Err(Damage::Wrong(format!(
             "pixel {} counts {} samples where its coverage has {}",
@@ -192,15 +225,6 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
             counts[i]
         )));
     }
-    drop(stored);
-    let sums: Vec<[Sums<f64>; REPLICATES]> = reader.array("sums", "<f8", &per_replicate, pixels)?;
-    let partial: Vec<[Sums<f32>; REPLICATES]> = if header.partial {
-        reader.array("partial", "<f4", &per_replicate, pixels)?
-    } else {
-        Vec::new()
-    };
-    reader.finish()?;
-
     for (i, (sum, &count)) in sums.iter().zip(&counts).enumerate() {
         check_pixel("sums", sum, count)
             .map_err(|e| Damage::Wrong(format!("pixel {}: {e}", pixel(header.bounds, i))))?;
@@ -209,7 +233,7 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
         check_pixel("partial", &sum.map(|s| s.map(f64::from)), count)
             .map_err(|e| Damage::Wrong(format!("pixel {}: {e}", pixel(header.bounds, i))))?;
     }
-    let film = Film::from_parts(
+    let mut film = Film::from_parts(
         header.size,
         header.bounds,
         header.strata,
@@ -217,6 +241,9 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
         sums,
         partial,
     );
+    for [x, y, samples @ ..] in left_out {
+        film.leave_out(x as u32, y as u32, samples);
+    }
     Ok((film, header.provenance))
 }
 
@@ -310,4 +337,33 @@ fn counts(coverage: &Coverage, bounds: Rect) -> Result<Vec<u64>, String> {
         }
     }
     Ok(counts)
+}
+
+/// Takes the samples of `left_out`, rows of x, y, and samples of each replicate, out of `counts`. An error if they do not
+/// lie in `bounds`, row by row, or are more than there are.
+fn subtract(
+    counts: &mut [u64],
+    bounds: Rect,
+    left_out: &[[u64; 2 + REPLICATES]],
+) -> Result<(), String> {
+    let mut last = None;
+    for &[x, y, ref samples @ ..] in left_out {
+        let inside = u32::try_from(x)
+            .ok()
+            .zip(u32::try_from(y).ok())
+            .filter(|&(x, y)| bounds.contains(x, y) && Some((y, x)) > last);
+        let sum = samples.iter().try_fold(0u64, |sum, &n| sum.checked_add(n));
+        let (Some((x, y)), Some(sum)) = (inside, sum) else {
+            return Err(format!(
+                "\"left_out\" names pixel ({x}, {y}) out of place, or more samples than there can be"
+            ));
+        };
+        last = Some((y, x));
+        let width = bounds.width() as usize;
+        let i = (y - bounds.y0) as usize * width + (x - bounds.x0) as usize;
+        counts[i] = counts[i].checked_sub(sum).ok_or(format!(
+            "pixel ({x}, {y}) leaves out more samples than it has"
+        ))?;
+    }
+    Ok(())
 }

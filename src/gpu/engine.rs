@@ -391,13 +391,18 @@ impl Engine for GpuEngine {
             ..Counters::default()
         };
         let width = rect.width() as usize;
+        let block = samples.start / BLOCK * BLOCK;
         for (i, c) in counted.iter().enumerate() {
+            let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
             counters.rays += u64::from(c[0]);
-            counters.truncated += u64::from(c[1]);
-            counters.nonfinite += u64::from(c[2]);
-            if c[2] > 0 && counters.first_nonfinite.is_none() {
+            counters.truncated += half(1, 0);
+            let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
+            if left_out != [0; REPLICATES] {
                 let (x, y) = (rect.x0 + (i % width) as u32, rect.y0 + (i / width) as u32);
-                counters.first_nonfinite = Some((x, y, u64::from(c[3]) - 1));
+                film.leave_out(x, y, left_out);
+                counters.nonfinite += left_out.iter().sum::<u64>();
+                let first = (x, y, block + half(1, 16) - 1);
+                counters.first_nonfinite = counters.first_nonfinite.or(Some(first));
             }
         }
         film.put_block(rect, samples, |x, y| {

@@ -145,7 +145,7 @@ impl Tile {
     }
 
     /// Reads each replicate from the texture that `place` says (`None` reads as zeros) into `running`, rows of pixels, and
-    /// returns the counters: rays, truncated paths, non-finite samples, 1 + number of the first of those.
+    /// returns the counters of each pixel, as `shaders/path.wgsl` packs them.
     pub fn download(
         &self,
         gpu: &Gpu,

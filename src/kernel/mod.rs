@@ -10,7 +10,7 @@ mod tables;
 
 pub use select::{Access, BAKED_LIMIT};
 
-use crate::film::REPLICATES;
+use crate::film::{BLOCK, REPLICATES};
 use crate::scene::Bsdf;
 use crate::settings::{Integrator, LightParts, Settings};
 use crate::world::{AIR, Geometry, World, WorldLight};
@@ -346,6 +346,7 @@ fn constants(world: &World, settings: &Settings) -> String {
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
     constant("GLANCES", "u32", format!("{GLANCES}u"));
+    constant("BLOCK", "u32", format!("{BLOCK}u"));
     constant("REPLICATES", "u32", format!("{REPLICATES}u"));
     constant("STRATA", "u32", format!("{}u", settings.strata));
     constant("ROUND_SAMPLES", "u32", format!("{}u", settings.round()));

@@ -73,15 +73,17 @@ impl CpuEngine {
         }
     }
 
-    /// Adds samples to one pixel's sums, one after another. `None` when told to stop.
+    /// Adds samples to one pixel's sums, one after another, and says how many of each replicate were not finite and are left
+    /// out. `None` when told to stop.
     fn render_pixel(
         &self,
         [x, y]: [u32; 2],
         samples: Range<u64>,
         mut sums: [Sums<f64>; REPLICATES],
         stop: &AtomicBool,
-    ) -> Option<([Sums<f64>; REPLICATES], Counters)> {
+    ) -> Option<Pixel> {
         let round = self.tracer.settings().round();
+        let mut left_out = [0; REPLICATES];
         let mut counters = Counters::default();
         for sample in samples {
             if stop.load(Ordering::Relaxed) {
@@ -92,19 +94,31 @@ impl CpuEngine {
             counters.rays += traced.rays;
             counters.truncated += u64::from(traced.truncated);
             let rgb = traced.radiance.to_array();
+            let replicate = (sample / round % REPLICATES as u64) as usize;
             if !traced.radiance.is_finite() {
+                left_out[replicate] += 1;
                 counters.nonfinite += 1;
                 counters.first_nonfinite = counters.first_nonfinite.or(Some((x, y, sample)));
                 continue;
             }
-            let replicate = (sample / round % REPLICATES as u64) as usize;
             let added = [rgb[0], rgb[1], rgb[2], luminance(rgb).powi(2)];
             for (sum, value) in sums[replicate].iter_mut().zip(added) {
                 *sum += value;
             }
         }
-        Some((sums, counters))
+        Some(Pixel {
+            sums,
+            left_out,
+            counters,
+        })
     }
+}
+
+/// What a pixel has after more samples.
+struct Pixel {
+    sums: [Sums<f64>; REPLICATES],
+    left_out: [u64; REPLICATES],
+    counters: Counters,
 }
 
 impl Engine for CpuEngine {
@@ -126,12 +140,13 @@ impl Engine for CpuEngine {
                 self.render_pixel([x, y], samples.clone(), sums, stop)
             })
             .collect();
-        let (sums, counters): (Vec<_>, Vec<_>) =
-            pixels.ok_or(EngineError::Stopped)?.into_iter().unzip();
-        film.put_samples(rect, samples, sums);
+        let pixels = pixels.ok_or(EngineError::Stopped)?;
+        film.put_samples(rect, samples, pixels.iter().map(|p| p.sums).collect());
         let mut total = Counters::default();
-        for c in counters {
-            total += c;
+        for (k, pixel) in (0..).zip(pixels) {
+            let (x, y) = (rect.x0 + k % rect.width(), rect.y0 + k / rect.width());
+            film.leave_out(x, y, pixel.left_out);
+            total += pixel.counters;
         }
         Ok(total)
     }

@@ -125,12 +125,15 @@ pub fn described(film: &Film) -> Provenance {
 /// Makes a film's JSON say `to` where it said `from`, of the same length or shorter, with every checksum right: what a
 /// program gone wrong, not a disk, would leave.
 pub fn forge(film: &mut [u8], from: &str, to: &str) {
-    let at = film
-        .windows(from.len())
-        .position(|w| w == from.as_bytes())
-        .unwrap_or_else(|| panic!("{from} is not in the file"));
     let padded = format!("{to:width$}", width = from.len());
-    film[at..at + from.len()].copy_from_slice(padded.as_bytes());
+    forge_bytes(film, from.as_bytes(), padded.as_bytes());
+}
+
+/// Puts `to`, which is as long, where `from` is first found, and makes the checksums right again.
+pub fn forge_bytes(film: &mut [u8], from: &[u8], to: &[u8]) {
+    let found = film.windows(from.len()).position(|w| w == from);
+    let at = found.unwrap_or_else(|| panic!("{} is not in the file", from.escape_ascii()));
+    film[at..at + from.len()].copy_from_slice(to);
     reseal(film);
 }
 

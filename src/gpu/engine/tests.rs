@@ -3,6 +3,11 @@ use crate::scene::parse;
 use crate::settings::Overrides;
 
 fn engine() -> (GpuEngine, Film, Rect) {
+    engine_with(str::to_owned)
+}
+
+/// An engine for 8 x 8 pixels whose kernel has gone through `change`.
+fn engine_with(change: impl Fn(&str) -> String) -> (GpuEngine, Film, Rect) {
     let scene = parse::parse_str(
         "diffuse.toml".as_ref(),
         include_str!("../../../scenes/diffuse.toml"),
@@ -14,18 +19,18 @@ fn engine() -> (GpuEngine, Film, Rect) {
     };
     let settings = Settings::resolve(&scene, &flags);
     let world = World::new(&scene, settings.size);
-    let engine = GpuEngine::new(&Choice::default(), &world, &settings, None);
+    let gpu = Gpu::open(&Choice::default()).expect("an adapter");
+    let mut kernel = compose(&world, &settings, None);
+    kernel.wgsl = change(&kernel.wgsl);
+    // SAFETY: the changes of these tests touch neither loops nor indices.
+    let engine = unsafe { GpuEngine::with_kernel(gpu, &world, &settings, kernel) };
     let rect = Rect {
         x0: 0,
         y0: 0,
         x1: 8,
         y1: 8,
     };
-    (
-        engine.expect("an adapter"),
-        Film::new([8, 8], rect, 2),
-        rect,
-    )
+    (engine.expect("an engine"), Film::new([8, 8], rect, 2), rect)
 }
 
 #[test]
@@ -66,4 +71,33 @@ fn strides_visit_every_group() {
         }
         assert!(seen.iter().all(|s| *s), "{groups} groups, stride {stride}");
     }
+}
+
+#[test]
+fn samples_that_are_not_finite_are_left_out_and_counted_by_replicate() {
+    let add = "let l = path.radiance;";
+    // One in every replicate's first round but the last's: samples 1, 5 and 9, and the same 256 later.
+    let faulty = "var l = path.radiance; if s % 4u == 1u && s % 256u < 12u { l.y = bitcast<f32>(0x7f800000u | (s >> 31u)); }";
+    let (mut engine, mut film, rect) = engine_with(|wgsl| {
+        assert!(wgsl.contains(add));
+        wgsl.replace(add, faulty)
+    });
+    let stop = AtomicBool::new(false);
+    for (samples, lost, first) in [(0..7, 2, 1), (7..256, 1, 9), (256..300, 3, 257)] {
+        let counters = engine
+            .render(&mut film, rect, samples, &stop)
+            .expect("samples");
+        assert_eq!(counters.nonfinite, lost * 64);
+        assert_eq!(counters.first_nonfinite, Some((0, 0, first)));
+    }
+    for pixel in film.left_out().iter() {
+        assert_eq!(pixel.2, [2, 2, 2, 0]);
+    }
+    assert_eq!(film.left_out().iter().count(), 64);
+    // What is left is the mean of the others: the same as if those had never been drawn.
+    film.for_each(|x, y, e| {
+        assert_eq!(e.samples, 294);
+        let sum: f64 = film.total(x, y).iter().map(|s| s[0]).sum();
+        assert_eq!(e.mean[0], sum / 294.0);
+    });
 }
