@@ -1,19 +1,20 @@
-// The path loop: every invocation takes one pixel through a range of samples of one replicate.
+// The path loop: every invocation takes one pixel through a range of samples.
 
 struct Params {
     // Top left pixel of the tile, and its width and height.
     tile: vec2u,
     size: vec2u,
-    // Range of indices among the replicate's samples.
+    // Range of sample numbers.
     first: u32,
     end: u32,
-    replicate: u32,
     // 1: the running sums start at zero.
     fresh: u32,
     seed: u32,
-    // Workgroups, and a stride without a common divisor: consecutive groups go far apart, so that a driver
-    // which hands each thread a contiguous share gives all of them the same picture to do.
+    // Workgroups of the tile, the number of the dispatch's first one, and a stride without a common divisor:
+    // consecutive groups go far apart, so that a driver which hands each thread a contiguous share gives all of them
+    // the same picture to do.
     groups: u32,
+    first_group: u32,
     stride: u32,
 }
 
@@ -52,11 +53,6 @@ struct Path {
     // Only a light counts from here on.
     ending: bool,
 #endif
-}
-
-// Number of the i-th sample of a replicate, which owns every REPLICATES-th round.
-fn sample_number(i: u32, replicate: u32) -> u32 {
-    return (i / ROUND_SAMPLES * REPLICATES + replicate) * ROUND_SAMPLES + i % ROUND_SAMPLES;
 }
 
 // A path but for its ray.
@@ -122,7 +118,7 @@ fn power_heuristic(a: f32, b: f32) -> f32 {
 
 @compute @workgroup_size(64)
 fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = group.x * params.stride % params.groups * 64u + lane;
+    let index = (params.first_group + group.x) * params.stride % params.groups * 64u + lane;
     if index >= params.size.x * params.size.y {
         return;
     }
@@ -130,14 +126,20 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     let pixel = params.tile + texel;
     let key = pixel.x | (pixel.y << 16u);
 
-    var sum = vec4f(0.0);
+    // The replicates' sums: values of their own, for an array indexed by a lane's sample would lie in memory.
+    var sum_0 = vec4f(0.0);
+    var sum_1 = vec4f(0.0);
+    var sum_2 = vec4f(0.0);
+    var sum_3 = vec4f(0.0);
     if params.fresh == 0u {
-        sum = textureLoad(running_in, texel, params.replicate, 0);
+        sum_0 = textureLoad(running_in, texel, 0, 0);
+        sum_1 = textureLoad(running_in, texel, 1, 0);
+        sum_2 = textureLoad(running_in, texel, 2, 0);
+        sum_3 = textureLoad(running_in, texel, 3, 0);
     }
     var count = counters[index];
 
-    var i = params.first;
-    var s = sample_number(i, params.replicate);
+    var s = params.first;
 #if SEEN_LIGHTS
     let glances = glances_at(pixel);
 #else
@@ -146,7 +148,7 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var path = begin(glances);
     path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances));
     // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
-    while i < params.end {
+    while s < params.end {
         var alive = false;
         let hit = intersect(path.ray);
         count.x += 1u;
@@ -182,19 +184,23 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             let y = dot(l, vec3f(0.2126, 0.7152, 0.0722));
             // WGSL may assume that there is no NaN: look at the bits.
             let finite = (bitcast<u32>(y) & 0x7fffffffu) < 0x7f800000u;
+            let replicate = s / ROUND_SAMPLES % REPLICATES;
             if finite {
                 // The square serves the error of a single replicate alone; it must not overflow.
                 let bounded = min(y, 1.0e15);
-                sum += vec4f(l, bounded * bounded);
+                let added = vec4f(l, bounded * bounded);
+                sum_0 = select(sum_0, sum_0 + added, replicate == 0u);
+                sum_1 = select(sum_1, sum_1 + added, replicate == 1u);
+                sum_2 = select(sum_2, sum_2 + added, replicate == 2u);
+                sum_3 = select(sum_3, sum_3 + added, replicate == 3u);
             } else {
                 let at = s % BLOCK + 1u;
                 count.y |= select(0u, at << 16u, count.y < 0x10000u);
-                let one = 1u << (16u * (params.replicate % 2u));
-                count.z += select(0u, one, params.replicate < 2u);
-                count.w += select(one, 0u, params.replicate < 2u);
+                let one = 1u << (16u * (replicate % 2u));
+                count.z += select(0u, one, replicate < 2u);
+                count.w += select(one, 0u, replicate < 2u);
             }
-            i += 1u;
-            s = sample_number(i, params.replicate);
+            s += 1u;
             path = begin(glances);
             glances_left = glances;
         }
@@ -202,7 +208,10 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances_left));
         }
     }
-    textureStore(running_out, texel, params.replicate, sum);
+    textureStore(running_out, texel, 0, sum_0);
+    textureStore(running_out, texel, 1, sum_1);
+    textureStore(running_out, texel, 2, sum_2);
+    textureStore(running_out, texel, 3, sum_3);
     counters[index] = count;
 }
 

@@ -6,7 +6,7 @@ use super::tile::{self, Tile};
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
 use crate::film::coverage::Rect;
-use crate::film::{BLOCK, Film, REPLICATES, Sums, samples_before};
+use crate::film::{BLOCK, Film, REPLICATES, Sums};
 use crate::kernel::{Access, Kernel, compose};
 use crate::settings::Settings;
 use crate::world::World;
@@ -18,8 +18,8 @@ use std::time::Instant;
 /// A submission aims to take this long: short for watchdogs and progress, long beside its overhead.
 const SUBMISSION_SECONDS: f64 = 0.1;
 
-/// Uniform offsets are multiples of this on every adapter.
-const SLOT: u64 = 256;
+/// Workgroups of the first submission, when nothing has been measured: enough to keep any adapter busy.
+const FIRST_GROUPS: u32 = 512;
 
 /// The engine that runs a scene's kernel on a Vulkan adapter.
 pub struct GpuEngine {
@@ -32,7 +32,6 @@ pub struct GpuEngine {
     tile: Option<Tile>,
     /// What the tile's textures hold since the last call, as it was read back.
     held: Option<Held>,
-    strata: u32,
     seed: u32,
     /// Seconds that one sample of one pixel takes, as measured so far.
     seconds_per_path: Option<f64>,
@@ -42,8 +41,8 @@ pub struct GpuEngine {
 /// Running sums that lie in a tile's textures.
 struct Held {
     rect: Rect,
-    /// The texture of each replicate.
-    place: [Option<usize>; REPLICATES],
+    /// Which texture.
+    place: usize,
     /// The sums, rows of the tile.
     running: Vec<[Sums<f32>; REPLICATES]>,
 }
@@ -158,7 +157,7 @@ impl GpuEngine {
         let scene = scene::bind(device, &scene_layout, &packed);
         let params = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
-            size: SLOT * REPLICATES as u64,
+            size: size_of::<Params>() as u64,
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
@@ -177,7 +176,6 @@ impl GpuEngine {
             params,
             tile: None,
             held: None,
-            strata: settings.strata,
             seed: settings.seed,
             seconds_per_path: None,
             compile_seconds: 0.0,
@@ -215,10 +213,7 @@ impl GpuEngine {
             y1: 1,
         };
         self.prepare_tile(rect)?;
-        let mut place = [Some(0); REPLICATES];
-        let tile = self.tile.as_ref().ok_or("no tile")?;
-        tile.upload(&self.gpu, &[Default::default()]);
-        self.submit(rect, 0..0, &mut place, true)?;
+        self.submit(rect, 0..0, 0..1, None)?;
         self.tile = None;
         Ok(())
     }
@@ -250,19 +245,32 @@ impl GpuEngine {
         Ok(())
     }
 
-    /// Dispatches `samples` of every pixel of `rect`, a dispatch for each replicate that owns some, and
-    /// waits. `place` says which texture holds a replicate's running sums (`None`: they start at zero);
-    /// `empty` dispatches without samples.
+    /// Dispatches `samples` of the pixels of some of the workgroups of `rect`, and waits. `place` says which texture holds
+    /// the running sums (`None`: they start at zero); the new ones go to the other.
     fn submit(
-        &mut self,
+        &self,
         rect: Rect,
         samples: Range<u64>,
-        place: &mut [Option<usize>; REPLICATES],
-        empty: bool,
+        groups: Range<u32>,
+        place: Option<usize>,
     ) -> Result<(), String> {
         let tile = self.tile.as_ref().ok_or("no tile")?;
-        let round = u64::from(self.strata) * u64::from(self.strata);
-        let groups = (rect.area() as u32).div_ceil(WORKGROUP);
+        let all = workgroups(rect);
+        let params = Params {
+            tile: [rect.x0, rect.y0],
+            size: [rect.width(), rect.height()],
+            first: samples.start as u32,
+            end: samples.end as u32,
+            fresh: u32::from(place.is_none()),
+            seed: self.seed,
+            groups: all,
+            first_group: groups.start,
+            stride: coprime_stride(all),
+            padding: 0,
+        };
+        self.gpu
+            .queue
+            .write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
         let mut encoder = self
             .gpu
             .device
@@ -271,37 +279,51 @@ impl GpuEngine {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &self.scene, &[]);
-            for (r, at) in place.iter_mut().enumerate() {
-                let first = samples_before(samples.start, r as u64, round);
-                let end = samples_before(samples.end, r as u64, round);
-                if first == end && !empty {
-                    continue;
-                }
-                let params = Params {
-                    tile: [rect.x0, rect.y0],
-                    size: [rect.width(), rect.height()],
-                    first: first as u32,
-                    end: end as u32,
-                    replicate: r as u32,
-                    fresh: u32::from(at.is_none()),
-                    seed: self.seed,
-                    groups,
-                    stride: coprime_stride(groups),
-                    padding: 0,
-                };
-                self.gpu.queue.write_buffer(
-                    &self.params,
-                    SLOT * r as u64,
-                    bytemuck::bytes_of(&params),
-                );
-                let from = at.unwrap_or(0);
-                pass.set_bind_group(1, &tile.bind_groups[from], &[(SLOT * r as u64) as u32]);
-                pass.dispatch_workgroups(groups, 1, 1);
-                *at = Some(1 - from);
-            }
+            pass.set_bind_group(1, &tile.bind_groups[place.unwrap_or(0)], &[]);
+            pass.dispatch_workgroups(groups.end - groups.start, 1, 1);
         }
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.wait()
+    }
+
+    /// Adds `samples` to the sums of every pixel of `rect`, in as many submissions as their cost asks for. A lane that
+    /// takes many samples of its pixel one after another waits the least for its neighbours' longer paths, so what is
+    /// cut is the picture, and the samples only where the driver's limit on loop trips is near.
+    fn submit_all(
+        &mut self,
+        rect: Rect,
+        samples: Range<u64>,
+        place: &mut Option<usize>,
+        stop: &AtomicBool,
+    ) -> Result<(), EngineError> {
+        let most = (self.gpu.trip_limit / self.kernel.trips_per_sample).max(1);
+        let all = workgroups(rect);
+        let mut at = samples.start;
+        while at < samples.end {
+            let end = samples.end.min(at + most);
+            let mut group = 0;
+            while group < all {
+                if stop.load(Ordering::Relaxed) {
+                    return Err(EngineError::Stopped);
+                }
+                let paths_per_group = f64::from(WORKGROUP) * (end - at) as f64;
+                let affordable = match self.seconds_per_path {
+                    Some(cost) => (SUBMISSION_SECONDS / (cost * paths_per_group)) as u32,
+                    None => FIRST_GROUPS,
+                };
+                let count = affordable.clamp(1, all - group);
+                let start = Instant::now();
+                self.submit(rect, at..end, group..group + count, *place)
+                    .map_err(EngineError::Device)?;
+                let cost = start.elapsed().as_secs_f64() / (f64::from(count) * paths_per_group);
+                self.seconds_per_path =
+                    Some(self.seconds_per_path.map_or(cost, |old| 0.5 * (old + cost)));
+                group += count;
+            }
+            *place = Some(1 - place.unwrap_or(0));
+            at = end;
+        }
+        Ok(())
     }
 
     fn render_tile(
@@ -317,17 +339,17 @@ impl GpuEngine {
             .tile
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
-        let mut place = [None; REPLICATES];
+        let mut place = None;
         let held = self.held.take();
         if !samples.start.is_multiple_of(BLOCK) {
             place = match &held {
-                Some(held) if held.is_in(film, rect) => held.place,
+                Some(held) if held.is_in(film, rect) => Some(held.place),
                 _ => {
                     let pixels =
                         (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
                     let running: Vec<_> = pixels.map(|(x, y)| film.partial_at(x, y)).collect();
                     tile.upload(&self.gpu, &running);
-                    [Some(0); REPLICATES]
+                    Some(0)
                 }
             };
         }
@@ -340,32 +362,14 @@ impl GpuEngine {
         tile.clear_counters(&mut encoder);
         self.gpu.queue.submit([encoder.finish()]);
 
-        let most = (self.gpu.trip_limit / self.kernel.trips_per_sample).max(1);
-        let pixels = rect.area() as f64;
-        let mut at = samples.start;
-        while at < samples.end {
-            if stop.load(Ordering::Relaxed) {
-                return Err(EngineError::Stopped);
-            }
-            let affordable = match self.seconds_per_path {
-                Some(cost) => (SUBMISSION_SECONDS / (cost * pixels)) as u64,
-                None => 1,
-            };
-            let count = affordable.clamp(1, most.min(samples.end - at));
-            let start = Instant::now();
-            self.submit(rect, at..at + count, &mut place, false)
-                .map_err(device_error)?;
-            let cost = start.elapsed().as_secs_f64() / (count as f64 * pixels);
-            self.seconds_per_path =
-                Some(self.seconds_per_path.map_or(cost, |old| 0.5 * (old + cost)));
-            at += count;
-        }
+        self.submit_all(rect, samples, &mut place, stop)?;
+        let place = place.unwrap_or(0);
         let tile = self
             .tile
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
         let counters = tile
-            .download(&self.gpu, &place, &mut running)
+            .download(&self.gpu, place, &mut running)
             .map_err(device_error)?;
         self.held = Some(Held {
             rect,
@@ -414,6 +418,11 @@ impl Engine for GpuEngine {
     fn device(&self) -> &DeviceInfo {
         &self.gpu.info
     }
+}
+
+/// Workgroups that cover `rect`.
+fn workgroups(rect: Rect) -> u32 {
+    (rect.area() as u32).div_ceil(WORKGROUP)
 }
 
 /// About 0.618 of `groups`, and without a common divisor with it: steps of this visit every group once.

@@ -52,18 +52,18 @@ pub struct Params {
     pub tile: [u32; 2],
     /// Width and height of the tile.
     pub size: [u32; 2],
-    /// First sample index within the replicate.
+    /// Number of the first sample.
     pub first: u32,
     /// One past the last.
     pub end: u32,
-    /// Which replicate.
-    pub replicate: u32,
     /// 1 when the running sums start at zero.
     pub fresh: u32,
     /// Seed of every random number.
     pub seed: u32,
-    /// Workgroups dispatched.
+    /// Workgroups of the tile.
     pub groups: u32,
+    /// Number of the first one dispatched.
+    pub first_group: u32,
     /// Stride through them, coprime to their number.
     pub stride: u32,
     /// Fills the struct to its alignment.
@@ -210,7 +210,7 @@ mod tests {
             Surface { point, radius, axis, offset, faces, material, top, solid, parent, shape }
             Material { color, kind, specular, exponent }
             DiskLight { center, radius, normal, offset, radiance, face }
-            Params { tile, size, first, end, replicate, fresh, seed, groups, stride }
+            Params { tile, size, first, end, fresh, seed, groups, first_group, stride }
         };
         // Struct declarations are all that is needed, wherever they stand.
         let mut text = String::new();

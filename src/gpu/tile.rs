@@ -82,11 +82,7 @@ impl Tile {
                 entries: &[
                     wgpu::BindGroupEntry {
                         binding: 0,
-                        resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                            buffer: params,
-                            offset: 0,
-                            size: wgpu::BufferSize::new(size_of::<super::pack::Params>() as u64),
-                        }),
+                        resource: params.as_entire_binding(),
                     },
                     wgpu::BindGroupEntry {
                         binding: 1,
@@ -144,12 +140,12 @@ impl Tile {
         }
     }
 
-    /// Reads each replicate from the texture that `place` says (`None` reads as zeros) into `running`, rows of pixels, and
-    /// returns the counters of each pixel, as `shaders/path.wgsl` packs them.
+    /// Reads the sums in texture number `place` into `running`, rows of pixels, and returns the counters of each pixel, as
+    /// `shaders/path.wgsl` packs them.
     pub fn download(
         &self,
         gpu: &Gpu,
-        place: &[Option<usize>; REPLICATES],
+        place: usize,
         running: &mut Vec<[Sums<f32>; REPLICATES]>,
     ) -> Result<Vec<[u32; 4]>, String> {
         let mut encoder = gpu
@@ -157,11 +153,10 @@ impl Tile {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let counter_bytes = self.counters.size();
         encoder.copy_buffer_to_buffer(&self.counters, 0, &self.staging, 0, counter_bytes);
-        for (r, k) in place.iter().enumerate() {
-            let Some(k) = k else { continue };
+        for r in 0..REPLICATES {
             encoder.copy_texture_to_buffer(
                 wgpu::TexelCopyTextureInfo {
-                    texture: &self.textures[*k],
+                    texture: &self.textures[place],
                     mip_level: 0,
                     origin: wgpu::Origin3d {
                         x: 0,
@@ -201,13 +196,11 @@ impl Tile {
         running.resize(pixels, Default::default());
         for (y, row) in running.chunks_exact_mut(width).enumerate() {
             let rows: [_; REPLICATES] = std::array::from_fn(|r| {
-                place[r].map(|_| &layers[layer_bytes(self.size) as usize * r + y * stride..])
+                &layers[layer_bytes(self.size) as usize * r + y * stride..]
             });
             for (x, pixel) in row.iter_mut().enumerate() {
                 *pixel = rows.map(|row| {
-                    row.map_or(Default::default(), |row| {
-                        bytemuck::pod_read_unaligned(&row[x * TEXEL as usize..][..TEXEL as usize])
-                    })
+                    bytemuck::pod_read_unaligned(&row[x * TEXEL as usize..][..TEXEL as usize])
                 });
             }
         }
@@ -244,7 +237,7 @@ pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
                 0,
                 wgpu::BindingType::Buffer {
                     ty: wgpu::BufferBindingType::Uniform,
-                    has_dynamic_offset: true,
+                    has_dynamic_offset: false,
                     min_binding_size: None,
                 },
             ),
