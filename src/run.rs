@@ -16,8 +16,11 @@ use std::time::{Duration, Instant};
 /// enough that the calls' own cost (reading back and folding, 10 to 20 ms at 512 x 384) does not matter.
 pub const CALL: Duration = Duration::from_millis(1000);
 
-/// Factor between the sample counts at which the error is looked at.
+/// Factor between the sample counts at which the error is looked at when it may end the run.
 const CHECK_FACTOR: f64 = 1.25;
+
+/// The same when it is only shown: every look ends a pass, and short passes make a software adapter's lanes wait.
+const SHOWN_CHECK_FACTOR: f64 = 4.0;
 
 /// The fewest samples at which the error may end a run.
 const MIN_CHECKED_SAMPLES: u64 = 16;
@@ -113,13 +116,17 @@ fn columns(r: Rect) -> impl Iterator<Item = Rect> {
     })
 }
 
-/// The first sample count after `count` at which the error may be looked at: whole numbers of rounds of
-/// all replicates, spaced by [`CHECK_FACTOR`], from [`MIN_CHECKED_SAMPLES`].
-fn next_check(count: u64, round: u64) -> u64 {
-    let period = round * REPLICATES as u64;
+/// The first sample count after `count` at which the error is looked at: whole numbers of rounds of all replicates,
+/// spaced by a factor, from [`MIN_CHECKED_SAMPLES`].
+fn next_check(count: u64, job: &Job) -> u64 {
+    let period = job.round * REPLICATES as u64;
+    let factor = match job.error {
+        Some(_) => CHECK_FACTOR,
+        None => SHOWN_CHECK_FACTOR,
+    };
     let mut check = MIN_CHECKED_SAMPLES.div_ceil(period) * period;
     while check <= count {
-        let next = (check as f64 * CHECK_FACTOR).ceil() as u64;
+        let next = (check as f64 * factor).ceil() as u64;
         check = next.div_ceil(period) * period;
     }
     check
@@ -177,22 +184,19 @@ impl<'a> Run<'a> {
         mut after: impl FnMut(&Film, &Tally) -> Result<(), E>,
     ) -> Result<StopReason, E> {
         let job = self.job;
-        let mut longest = 1;
         let mut at = job.samples.start;
         loop {
             at = first_missing(&self.film.coverage, job, at);
             let count = at - job.samples.start;
-            let check = next_check(count.saturating_sub(1), job.round);
+            let check = next_check(count.saturating_sub(1), job);
             if count == check && self.enough(count) {
                 return Ok(StopReason::Error);
             }
             if at >= job.samples.end {
                 return Ok(StopReason::Samples);
             }
-            let next = next_check(count, job.round);
-            let end = self.pass_end(at, longest).min(job.samples.start + next);
-            // Pass lengths grow from 1: the first picture comes early.
-            longest = longest.max((end - at) * 2);
+            let next = next_check(count, job);
+            let end = self.pass_end(at).min(job.samples.start + next);
             for tile in &job.tiles {
                 for (rect, ranges) in self.film.coverage.missing(*tile, at..end) {
                     for part in ranges {
@@ -230,14 +234,14 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Where a pass that starts at `at` ends: after at most `longest` samples, at the end of their block, of
-    /// the job, or of what a call can do in time.
-    fn pass_end(&self, at: u64, longest: u64) -> u64 {
+    /// Where a pass that starts at `at` ends: at the end of the block, of the job, or of what a call can do in time. The
+    /// first is one sample long, and tells the pace.
+    fn pass_end(&self, at: u64) -> u64 {
         let block_end = (at / BLOCK + 1) * BLOCK;
-        let mut length = longest;
+        let mut length = 1;
         if let Some(pace) = self.pace {
             let fits = |seconds: f64, pixels: u64| (seconds / (pace * pixels as f64)) as u64;
-            length = length.min(fits(self.job.call.as_secs_f64(), self.widest));
+            length = fits(self.job.call.as_secs_f64(), self.widest);
             if let Some(time) = self.job.time {
                 // So that all tiles come to the same count when the time ends.
                 let left = (time.as_secs_f64() - self.tally.seconds).max(0.0);
@@ -286,7 +290,7 @@ impl<'a> Run<'a> {
             // The error falls with the square root of the samples, and is next looked at then or later.
             (Some(target), Some((count, error))) => {
                 let reached = count as f64 * (error / target).powi(2);
-                let check = next_check((reached as u64).max(count), job.round);
+                let check = next_check((reached as u64).max(count), job);
                 needed = needed.min(check as f64);
             }
             (Some(_), None) if job.time.is_none() => return None,

@@ -15,6 +15,10 @@ pub const GET_ADAPTER: &str = "apt-get install mesa-vulkan-drivers";
 /// Pixels that the CPU reference is given at once: a sample of each takes a fraction of a second.
 const CPU_TILE_PIXELS: u64 = 1 << 16;
 
+/// Pixels that a software adapter is given at once: in a call's time it takes many samples of each, and its lanes wait
+/// less for each other's longer paths.
+const SOFTWARE_TILE_PIXELS: u64 = 1 << 16;
+
 /// An engine, and what the renderer must know about it.
 pub struct Chosen {
     /// What renders.
@@ -49,8 +53,12 @@ pub fn choose(
             compile_seconds: engine.compile_seconds(),
             wgsl: Some(engine.kernel().wgsl.clone()),
             access: Some(engine.kernel().access),
+            tile_pixels: if engine.device().software {
+                SOFTWARE_TILE_PIXELS
+            } else {
+                MAX_TILE_PIXELS
+            },
             engine: Box::new(engine),
-            tile_pixels: MAX_TILE_PIXELS,
             note: None,
         }),
         Err(e) => {

@@ -121,7 +121,7 @@ fn tiles_hold_each_pixel_once_within_the_limit() {
 }
 
 #[test]
-fn passes_cover_the_job_grow_and_stay_in_their_block() {
+fn passes_cover_the_job_and_stay_in_their_block() {
     let job = job([7, 5], 14, 0..700);
     let mut film = Film::new([7, 5], Rect::whole([7, 5]), 2);
     let mut engine = Fake::new();
@@ -206,15 +206,19 @@ fn forecasts_of_the_error_come_true() {
 
 #[test]
 fn checks_are_whole_rounds_of_all_replicates() {
-    let mut count = 0;
-    let mut seen = Vec::new();
-    for _ in 0..6 {
-        count = next_check(count, 4);
-        seen.push(count);
-    }
-    assert_eq!(seen, [16, 32, 48, 64, 80, 112]);
-    assert_eq!(next_check(0, 1), 16);
-    assert_eq!(next_check(0, 9), 36);
+    let mut job = job([1, 1], 1, 0..1 << 20);
+    let checks = |job: &Job| {
+        let after = |count: &u64| Some(next_check(*count, job));
+        let counts = std::iter::successors(Some(next_check(0, job)), after);
+        counts.take(6).collect::<Vec<_>>()
+    };
+    assert_eq!(checks(&job), [16, 64, 256, 1024, 4096, 16384]);
+    job.error = Some(0.1);
+    assert_eq!(checks(&job), [16, 32, 48, 64, 80, 112]);
+    job.round = 1;
+    assert_eq!(next_check(0, &job), 16);
+    job.round = 9;
+    assert_eq!(next_check(0, &job), 36);
 }
 
 #[test]
@@ -238,7 +242,7 @@ fn a_failing_device_leaves_what_was_done() {
     let mut film = Film::new(size, Rect::whole(size), 2);
     let job = job(size, 64, 0..64);
     let mut engine = Fake::new();
-    engine.fail_at = Some(3);
+    engine.fail_at = Some(2);
     let stop = AtomicBool::new(false);
     let mut run = Run::new(&job, &mut engine, &mut film, &stop);
     let e = run.go(|_, _| Ok::<(), EngineError>(())).unwrap_err();
