@@ -478,7 +478,7 @@ mod tests {
         let mut film = Film::new([2, 1], rect, 1);
         film.put_samples(rect, 0..4, vec![light; 2]);
         film.leave_out(1, 0, [0, 0, 1, 0]);
-        let counts = replicate_counts(&[0..4], 1);
+        let counts = [1; REPLICATES];
         let [whole, three] = [0, 1].map(|x| film.estimate(x, 0, &counts));
         assert_eq!(
             (whole.mean[0], whole.samples, whole.replicates),
