@@ -1,31 +1,21 @@
 // The pinhole camera: jittered strata over the pixel's square, box filter.
 
-// Where in the pixel's square sample s lies, in [0, 1)^2: strata x strata cells, visited in an order
-// shuffled anew for every round of strata^2 samples. Glance k > 0 of the sample stays in its k-th share of that cell.
+// Where in the pixel's square sample s lies, in [0, 1)^2: strata x strata cells, visited in an order shuffled anew for
+// every round of strata^2 samples. Glance k > 0 of the sample stays in its k-th share of that cell.
 fn film_position(pixel: u32, s: u32, seed: u32, k: u32) -> vec2f {
-    // Dimension 0; path vertices count from 1.
-    var jitter = unit_float(pcg4d(vec4u(pixel, s, select(0u, 0x40000000u + k, k > 0u), seed))).xy;
+    var jitter = vec2f(hash_pixel(pixel, s + (k << 24u), seed) >> vec2u(8u)) * 0x1.0p-24;
 #if SEEN_LIGHTS
     let share = vec2f(f32((k - 1u) % GLANCES), f32((k - 1u) / GLANCES));
     jitter = select(jitter, (share + jitter) * (1.0 / f32(GLANCES)), k > 0u);
 #endif
 #if STRATA
-    let round = s / (STRATA * STRATA);
-    let order = jitter_order(pixel, round, seed);
-    let cell = permute(s % (STRATA * STRATA), STRATA * STRATA, order);
+    let cell = shuffled_cell(s % ROUND_SAMPLES, ROUND_SAMPLES, hash_pixel(pixel, s / ROUND_SAMPLES, ~seed).x);
     let corner = vec2f(f32(cell % STRATA), f32(cell / STRATA));
     return (corner + jitter) * (1.0 / f32(STRATA));
 #else
     return jitter;
 #endif
 }
-
-#if STRATA
-// One word for every pixel and round.
-fn jitter_order(pixel: u32, round: u32, seed: u32) -> u32 {
-    return pcg4d(vec4u(pixel, round, 0xffffffffu, seed)).x;
-}
-#endif
 
 fn camera_ray(pixel: vec2u, within: vec2f) -> Ray {
     // Whole pixels first: their difference is exact.

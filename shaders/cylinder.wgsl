@@ -33,14 +33,14 @@ struct Span {
 }
 
 fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span {
-    // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0. The quotient
+    // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0. The product
     // is that of planes and disks, so that what coincides is met at the same distance to the bit.
     let along = dot(c.axis, ray.d);
     let up = along > 0.0;
-    let cos = select(min(along, -1.0e-20), max(along, 1.0e-20), up);
+    let inv_cos = safe_inverse(along);
     let height = dot(c.axis, ray.o);
-    let at_base = select((c.offsets.x - height) / cos, 0.0, ray.face == base);
-    let at_top = select((c.offsets.y - height) / cos, 0.0, ray.face == top);
+    let at_base = select((c.offsets.x - height) * inv_cos, 0.0, ray.face == base);
+    let at_top = select((c.offsets.y - height) * inv_cos, 0.0, ray.face == top);
     let slab_enter = select(at_top, at_base, up);
     let slab_leave = select(at_base, at_top, up);
 
@@ -51,25 +51,20 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
     let a = dot(d, d);
     let b = dot(m, d);
     let parallel = a < ALONG_AXIS;
-    let inv_a = 1.0 / max(a, ALONG_AXIS);
+    let inv_a = 1.0 / fmax(a, ALONG_AXIS);
     let w = m - d * (b * inv_a);
     let excess = dot(m, m) - c.radius * c.radius;
     let disc = a * (c.radius * c.radius - dot(w, w));
-    let root = safe_sqrt(disc);
-    let q = -(b + select(-root, root, b >= 0.0));
-    let first = q * inv_a;
-    let second = select(excess / q, first, q == 0.0);
-    // Standing on the side, one root is 0 and the other is known without it.
-    let on_side = ray.face == side;
-    let other = -2.0 * b * inv_a;
-    let near = select(select(min(first, second), min(other, 0.0), on_side), -FAR, parallel);
-    let far = select(select(max(first, second), max(other, 0.0), on_side), FAR, parallel);
+    // Standing on the side, one root is 0 and the other is known without it: as if the square root were |b|.
+    let root = select(safe_sqrt(disc), abs(b), ray.face == side);
+    let near = select((-b - root) * inv_a, -FAR, parallel);
+    let far = select((root - b) * inv_a, FAR, parallel);
 
     let by_cap = slab_enter >= near;
     let to_cap = slab_leave < far;
     return Span(
-        max(slab_enter, near),
-        min(slab_leave, far),
+        fmax(slab_enter, near),
+        fmin(slab_leave, far),
         select(CYLINDER_SIDE, select(CYLINDER_TOP, CYLINDER_BASE, up), by_cap),
         select(CYLINDER_SIDE, select(CYLINDER_BASE, CYLINDER_TOP, up), to_cap),
         by_cap && ray.target_face == select(top, base, up),
@@ -82,13 +77,13 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
 fn cylinder_outside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
     let met = s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side && !s.enter_target;
-    return nearer(hit, met, max(s.enter, 0.0), key + s.enter_part);
+    return nearer(hit, met, fmax(s.enter, 0.0), key + s.enter_part);
 }
 
 // For a ray known to be inside.
 fn cylinder_inside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
-    return nearer(hit, !s.leave_target, max(s.leave, 0.0), key + s.leave_part);
+    return nearer(hit, !s.leave_target, fmax(s.leave, 0.0), key + s.leave_part);
 }
 
 // The boundary of dielectric solid `solid` inside `parent`.
@@ -96,7 +91,7 @@ fn cylinder_boundary(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top:
     let s = cylinder_span(ray, c, side, base, top);
     let inside = ray.medium == solid;
     let enters = ray.medium == parent && s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
-    let t = max(select(s.enter, s.leave, inside), 0.0);
+    let t = fmax(select(s.enter, s.leave, inside), 0.0);
     let met = (inside && !s.leave_target) || (enters && !s.enter_target);
     return nearer(hit, met, t, key + select(s.enter_part, s.leave_part, inside));
 }

@@ -10,6 +10,11 @@ fn from_frame(n: vec3f, local: vec3f) -> vec3f {
     return tangent * local.x + bitangent * local.y + n * local.z;
 }
 
+// Unit length for what has it but for rounding: one step of Newton's method, without root or quotient.
+fn renormalized(v: vec3f) -> vec3f {
+    return v * (1.5 - 0.5 * dot(v, v));
+}
+
 // (cos, sin) of 2 pi (u - 1/2), u in [0, 1), to 2e-7: WGSL promises no more than 5e-4 of its own. Taylor's series
 // of half the angle, which lies within pi / 2, and the formulas that double it.
 fn unit_circle(u: f32) -> vec2f {
@@ -22,5 +27,5 @@ fn unit_circle(u: f32) -> vec2f {
 
 // Square root of max(x, 0): rounding may have made x negative.
 fn safe_sqrt(x: f32) -> f32 {
-    return sqrt(max(x, 0.0));
+    return sqrt(fmax(x, 0.0));
 }

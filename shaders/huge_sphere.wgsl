@@ -25,16 +25,16 @@ fn huge_roots(ray: Ray, s: HugeSphere) -> HugeRoots {
 
 fn huge_sphere_outside(hit: Hit, ray: Ray, s: HugeSphere, face: u32, key: u32) -> Hit {
     let r = huge_roots(ray, s);
-    let t = max(r.c, 0.0) / (r.b + safe_sqrt(r.disc));
+    let t = fmax(r.c, 0.0) / (r.b + safe_sqrt(r.disc));
     return nearer(hit, r.disc >= 0.0 && r.b > 0.0 && ray.face != face, t, key);
 }
 
 fn huge_sphere_inside(hit: Hit, ray: Ray, s: HugeSphere, face: u32, key: u32) -> Hit {
     let r = huge_roots(ray, s);
-    let q = max(abs(r.b) + safe_sqrt(r.disc), TINY);
+    let q = fmax(abs(r.b) + safe_sqrt(r.disc), TINY);
     let ahead = select(-r.c / q, q / s.curvature, r.b > 0.0);
     let t = select(ahead, 2.0 * r.b / s.curvature, ray.face == face);
-    return nearer(hit, true, max(t, 0.0), key);
+    return nearer(hit, true, fmax(t, 0.0), key);
 }
 
 fn huge_sphere_boundary(hit: Hit, ray: Ray, s: HugeSphere, face: u32, key: u32, solid: u32, parent: u32) -> Hit {

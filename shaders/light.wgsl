@@ -28,7 +28,7 @@ struct Cap {
 fn cap_of(light: DiskLight, p: vec3f) -> Cap {
     let r2 = light.radius * light.radius;
     let v = p - light.center;
-    let h = max(dot(light.normal, p) - light.offset, 0.0);
+    let h = fmax(dot(light.normal, p) - light.offset, 0.0);
     let radial = v - light.normal * dot(light.normal, v);
     let a2 = dot(radial, radial);
     let s = a2 + h * h - r2;
@@ -39,10 +39,10 @@ fn cap_of(light: DiskLight, p: vec3f) -> Cap {
     // and farthest point.
     let a = sqrt(a2);
     let q = length(vec2f(a - light.radius, h)) * length(vec2f(a + light.radius, h));
-    let height = select((q - s) / max(2.0 * h, TINY), 2.0 * h * (r2 / max(q + s, TINY)), far);
+    let height = select((q - s) / fmax(2.0 * h, TINY), 2.0 * h * (r2 / fmax(q + s, TINY)), far);
 #else
     let q = sqrt(s * s + 4.0 * h * h * r2);
-    let height = select(q - s, 2.0 * h * r2, far) / max(select(2.0 * h, q + s, far), TINY);
+    let height = select(q - s, 2.0 * h * r2, far) / fmax(select(2.0 * h, q + s, far), TINY);
 #endif
     return Cap(v, h, a2, s, q, select(0.0, height, h > 0.0));
 }
@@ -51,8 +51,8 @@ struct LightSample {
     // Unit direction to the point chosen on the disk, and the distance to it.
     d: vec3f,
     distance: f32,
-    // Per solid angle; 0: no sample, the point is behind the light or in its plane.
-    pdf: f32,
+    // 1 / density per solid angle; 0: no sample, the point is behind the light or in its plane.
+    inverse_pdf: f32,
 }
 
 fn sample_cap(light: DiskLight, cap: Cap, u: vec2f) -> LightSample {
@@ -60,34 +60,34 @@ fn sample_cap(light: DiskLight, cap: Cap, u: vec2f) -> LightSample {
     let rho = safe_sqrt(u.x * (light.radius * light.radius + (1.0 - u.x) * cap.height * cap.height));
     let circle = unit_circle(u.y) * rho;
     let d = from_frame(light.normal, vec3f(circle, -depth)) - cap.v;
-    let length = length(d);
-    let pdf = length / (3.14159265 * max(cap.height, TINY));
-    let to_disk = cap.h / max(cap.h + depth, TINY);
-    return LightSample(d / max(length, TINY), length * to_disk, select(0.0, pdf, cap.height > 0.0 && length > 0.0));
+    let length2 = dot(d, d);
+    let inverse_length = inverseSqrt(fmax(length2, TINY));
+    let to_disk = cap.h / fmax(cap.h + depth, TINY);
+    let sample = cap.height > 0.0 && length2 > 0.0;
+    let inverse_pdf = 3.14159265 * cap.height * inverse_length;
+    return LightSample(d * inverse_length, length2 * inverse_length * to_disk, select(0.0, inverse_pdf, sample));
 }
 
 // The density with which sample_cap takes direction d, which meets the disk; per solid angle.
 fn cap_pdf(light: DiskLight, cap: Cap, d: vec3f) -> f32 {
     let along = dot(light.normal, d);
-    let chord = 2.0 * (cap.s / (2.0 * max(cap.h, TINY)) * along - dot(cap.v, d));
-    return select(0.0, max(chord, 0.0) / (3.14159265 * max(cap.height, TINY)), cap.height > 0.0);
+    let chord = 2.0 * (cap.s / (2.0 * fmax(cap.h, TINY)) * along - dot(cap.v, d));
+    return select(0.0, fmax(chord, 0.0) / (3.14159265 * fmax(cap.height, TINY)), cap.height > 0.0);
 }
 
 #if SEVERAL_LIGHTS
-// What the light would send to a receiver with normal n at the cap's point if nothing were in between,
-// up to a factor: the closed form of the irradiance of a disk, which is exact while the whole disk is above the
-// receiver's horizon. Below, a tenth of what a receiver that faces the light would get keeps every light that can
-// contribute; 0 only when none of it can.
-fn light_weight(light: DiskLight, cap: Cap, n: vec3f) -> f32 {
+// About what the light would send to a receiver at p with normal n if nothing were in between, up to a factor: the
+// irradiance of a disk far away, r^2 cos cos / d^2, with every length made longer by the radius. That keeps it finite
+// and about right near the light, keeps every light that can contribute, and costs one quotient. 0 only where the light
+// shows its back or lies below the receiver's horizon.
+fn light_weight(light: DiskLight, p: vec3f, n: vec3f) -> f32 {
     let r2 = light.radius * light.radius;
-    let hq = cap.h / max(cap.q, TINY);
-    let parallel = hq * cap.height;
-    let across = 2.0 * hq * r2 / (cap.a2 + cap.h * cap.h + r2 + cap.q);
-    let axial = dot(light.normal, cap.v);
-    let irradiance = -parallel * dot(n, light.normal) - across * (dot(n, cap.v) - dot(n, light.normal) * axial);
-    let facing = parallel + across * sqrt(cap.a2);
-    let below = dot(n, cap.v) >= light.radius;
+    let to = light.center - p;
+    let inverse = 1.0 / (dot(to, to) + r2);
+    let h = dot(light.normal, p) - light.offset;
+    let above = fmax(dot(n, to) + light.radius, 0.0);
     let luminance = dot(light.radiance, vec3f(0.2126, 0.7152, 0.0722));
-    return select(max(irradiance, 0.1 * facing) * luminance, 0.0, below);
+    let facing = h + light.radius * (r2 * inverse);
+    return select(0.0, luminance * r2 * (facing * above * inverse * inverse), h > 0.0);
 }
 #endif

@@ -87,8 +87,8 @@ fn glances_at(pixel: vec2u) -> u32 {
         let along = dot(to, w) / far;
         let off = length(to - w * (along / far));
         let near = along > 0.0 && off <= light.radius + half_diagonal * length(to);
-        let t = height / min(fall, -TINY);
-        let spread = 1.5 * t * half_diagonal * (1.0 - far / min(fall, -TINY));
+        let t = height / fmin(fall, -TINY);
+        let spread = 1.5 * t * half_diagonal * (1.0 - far / fmin(fall, -TINY));
         let inside = length(w * t - to) <= light.radius + spread;
         if height < 0.0 && near && (inside || fall > -3.0 * half_diagonal) {
             glances = GLANCES * GLANCES;
@@ -108,10 +108,10 @@ fn kept(scatterings: u32) -> bool {
 }
 
 #if MIS
-// Power heuristic [Veach1995]: the share of a sample with density a, where b would find it too.
-fn power_heuristic(a: f32, b: f32) -> f32 {
+// Power heuristic [Veach1995]: the share of a sample whose density is 1 / inverse, where density b would find it too.
+fn power_heuristic(inverse: f32, b: f32) -> f32 {
     // The ratio first: squares of large densities overflow.
-    let r = b / max(a, TINY);
+    let r = b * inverse;
     return 1.0 / (1.0 + r * r);
 }
 #endif
@@ -187,7 +187,7 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             let replicate = s / ROUND_SAMPLES % REPLICATES;
             if finite {
                 // The square serves the error of a single replicate alone; it must not overflow.
-                let bounded = min(y, 1.0e15);
+                let bounded = fmin(y, 1.0e15);
                 let added = vec4f(l, bounded * bounded);
                 sum_0 = select(sum_0, sum_0 + added, replicate == 0u);
                 sum_1 = select(sum_1, sum_1 + added, replicate == 1u);
@@ -226,9 +226,9 @@ fn emission(path: Path, hit: Hit) -> vec3f {
         let cap = cap_of(light, path.ray.o);
         var pdf = cap_pdf(light, cap, path.ray.d);
 #if SEVERAL_LIGHTS
-        pdf *= light_weight(light, cap, path.n) / max(path.weights, TINY);
+        pdf *= light_weight(light, path.ray.o, path.n) / fmax(path.weights, TINY);
 #endif
-        share *= select(0.0, power_heuristic(path.pdf, SHADOW_RAYS * pdf), path.pdf > 0.0);
+        share *= select(0.0, power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * pdf), path.pdf > 0.0);
     }
 #else
     share *= select(0.0, 1.0, path.specular);
@@ -295,12 +295,13 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
             weights = chosen.weights;
             let to = sample_cap(chosen.light, chosen.cap, points);
             let cos = dot(n, to.d);
-            let pdf = to.pdf * chosen.probability;
-            if cos > 0.0 && pdf > 0.0 && kept((*path).depth) {
+            // 1 / density of this sample among all.
+            let inverse_pdf = to.inverse_pdf * chosen.inverse_probability * (1.0 / SHADOW_RAYS);
+            if cos > 0.0 && inverse_pdf > 0.0 && kept((*path).depth) {
                 var f_cos = material.color * (0.31830989 * cos);
 #if MIS_DIFFUSE
                 if material.kind == MATERIAL_DIFFUSE {
-                    f_cos *= power_heuristic(SHADOW_RAYS * pdf, cos * 0.31830989);
+                    f_cos *= power_heuristic(inverse_pdf, cos * 0.31830989);
                 }
 #endif
 #if PHONG
@@ -309,14 +310,14 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
                     let value = phong_value(material.color, material.specular, material.exponent, cos, power);
                     f_cos = value.f_cos;
 #if MIS
-                    f_cos *= power_heuristic(SHADOW_RAYS * pdf, value.pdf);
+                    f_cos *= power_heuristic(inverse_pdf, value.pdf);
 #endif
                 }
 #endif
                 (*count).x += 1u;
                 let shadow = Ray(v.p, to.d, face, (*path).ray.medium, chosen.light.face);
                 if !occluded(shadow, to.distance, chosen.index) {
-                    gathered += f_cos * chosen.light.radiance * (1.0 / (pdf * SHADOW_RAYS));
+                    gathered += f_cos * chosen.light.radiance * inverse_pdf;
                 }
             }
 #if SEVERAL_SHADOW_RAYS
@@ -345,7 +346,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         next = sample_cosine(n, u.points.zw);
         weight = material.color;
 #if MIS_DIFFUSE
-        (*path).pdf = max(dot(n, next), 0.0) * 0.31830989;
+        (*path).pdf = fmax(dot(n, next), 0.0) * 0.31830989;
 #endif
     }
 #endif
@@ -366,7 +367,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         let value = phong_value(material.color, material.specular, material.exponent, cos, power);
         // Below the horizon the sample counts as zero and is not drawn again. Where there is no diffuse part the
         // powers cancel, and nothing is left to divide.
-        var quotient = value.f_cos / max(value.pdf, TINY);
+        var quotient = value.f_cos * (1.0 / fmax(value.pdf, TINY));
         if choice >= 1.0 {
             quotient = material.specular * ((material.exponent + 2.0) / (material.exponent + 1.0) * cos);
         }
@@ -408,12 +409,12 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
 #endif
     // Russian roulette: short paths are cheap, and cutting them only adds noise.
-    let brightest = max(max(beta.x, beta.y), beta.z);
+    let brightest = fmax(fmax(beta.x, beta.y), beta.z);
     var survival = 1.0;
     if (*path).depth >= ROULETTE_DEPTH {
-        survival = min(1.0, brightest);
+        survival = fmin(1.0, brightest);
     }
-    (*path).beta = beta / max(survival, TINY);
+    (*path).beta = beta * (1.0 / fmax(survival, TINY));
     (*path).depth += 1u;
     return brightest > 0.0 && u.choices.z < survival;
 }

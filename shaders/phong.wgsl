@@ -8,7 +8,7 @@ fn phong_power(w: vec3f, r: vec3f, exponent: f32) -> f32 {
     let x = 0.5 * dot(diff, diff);
     // log(1 - x); the series is good to 1e-7 below 0.05.
     let series = -x * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2))));
-    let log_cos = select(log(max(1.0 - x, TINY)), series, x < 0.05);
+    let log_cos = select(log(fmax(1.0 - x, TINY)), series, x < 0.05);
     return select(0.0, exp(exponent * log_cos), x < 1.0);
 }
 
@@ -21,13 +21,13 @@ struct LobeSample {
 // Unit direction about r with density (n + 1) / (2 pi) cos^n(alpha) per solid angle.
 fn sample_lobe(r: vec3f, exponent: f32, u: vec2f) -> LobeSample {
     // 1 - u is never 0.
-    let log_u = log(1.0 - u.x) / (exponent + 1.0);
+    let log_u = log(1.0 - u.x) * (1.0 / (exponent + 1.0));
     // 1 - cos^2(alpha) = 1 - exp(2 log_u); the series is good to 1e-7 below 0.05.
     let x = 2.0 * log_u;
     let series = -x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0))));
     let sin2 = select(1.0 - exp(x), series, x > -0.05);
     let circle = unit_circle(u.y) * safe_sqrt(sin2);
-    let d = normalize(from_frame(r, vec3f(circle, safe_sqrt(1.0 - sin2))));
+    let d = renormalized(from_frame(r, vec3f(circle, safe_sqrt(1.0 - sin2))));
     return LobeSample(d, exp(exponent * log_u));
 }
 
@@ -35,7 +35,7 @@ fn sample_lobe(r: vec3f, exponent: f32, u: vec2f) -> LobeSample {
 fn lobe_probability(kd: vec3f, ks: vec3f) -> f32 {
     let d = kd.x + kd.y + kd.z;
     let s = ks.x + ks.y + ks.z;
-    return s / max(d + s, TINY);
+    return s / fmax(d + s, TINY);
 }
 
 struct PhongValue {

@@ -10,8 +10,8 @@ struct Plane {
 // through the edge of a closed room.
 fn plane_front(hit: Hit, ray: Ray, p: Plane, face: u32, key: u32) -> Hit {
     let cos = dot(p.normal, ray.d);
-    let t = (p.offset - dot(p.normal, ray.o)) / cos;
-    return nearer(hit, cos < 0.0 && ray.target_face != face, max(t, 0.0), key);
+    let t = (p.offset - dot(p.normal, ray.o)) * safe_inverse(cos);
+    return nearer(hit, cos < 0.0 && ray.target_face != face, fmax(t, 0.0), key);
 }
 
 // Two opaque planes that face each other, n.p = low.offset below and n.p = high above: a ray meets the one
@@ -20,15 +20,15 @@ fn plane_pair(hit: Hit, ray: Ray, low: Plane, high: f32, low_key: u32, high_key:
     let cos = dot(low.normal, ray.d);
     let down = cos < 0.0;
     let key = select(high_key, low_key, down);
-    let t = (select(high, low.offset, down) - dot(low.normal, ray.o)) / cos;
-    return nearer(hit, cos != 0.0, max(t, 0.0), key);
+    let t = (select(high, low.offset, down) - dot(low.normal, ray.o)) * safe_inverse(cos);
+    return nearer(hit, cos != 0.0, fmax(t, 0.0), key);
 }
 
 // The boundary of a dielectric half-space, which lies behind the normal.
 fn plane_boundary(hit: Hit, ray: Ray, p: Plane, face: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let cos = dot(p.normal, ray.d);
-    let t = (p.offset - dot(p.normal, ray.o)) / cos;
+    let t = (p.offset - dot(p.normal, ray.o)) * safe_inverse(cos);
     let leaves = ray.medium == solid && cos > 0.0;
     let enters = ray.medium == parent && cos < 0.0;
-    return nearer(hit, (leaves || enters) && ray.target_face != face, max(t, 0.0), key);
+    return nearer(hit, (leaves || enters) && ray.target_face != face, fmax(t, 0.0), key);
 }

@@ -39,6 +39,30 @@ fn draw(key: vec4u) -> Draws {
     return Draws(unit_float(a), unit_float(b));
 }
 
+// Two words for the place in a pixel, which asks for less than light does: few multiplications, for every one of them is
+// paid in every turn of the path loop.
+fn hash_pixel(pixel: u32, s: u32, seed: u32) -> vec2u {
+    var v = (pixel ^ (seed * 0x85ebca6bu)) * 0x9e3779b1u + s * 0xc2b2ae35u;
+    v = (v ^ (v >> 15u)) * 0x2c1b3c6du;
+    v = (v ^ (v >> 12u)) * 0x297a2d39u;
+    v ^= v >> 15u;
+    let w = (v ^ 0x68bc21ebu) * 0x846ca68bu;
+    return vec2u(v, w ^ (w >> 16u));
+}
+
+#if STRATA
+
+// Position i of a random permutation of `count` cells of a pixel.
+fn shuffled_cell(i: u32, count: u32, order: u32) -> u32 {
+#if STRATA_NOT_A_POWER_OF_TWO
+    return permute(i, count, order);
+#else
+    return (i ^ (order >> 16u)) % count;
+#endif
+}
+#endif
+
+#if STRATA_NOT_A_POWER_OF_TWO
 // Position i of a random permutation of `count` elements, keyed by p [Kensler2013].
 fn permute(i: u32, count: u32, p: u32) -> u32 {
     var mask = count - 1u;
@@ -48,12 +72,10 @@ fn permute(i: u32, count: u32, p: u32) -> u32 {
     mask |= mask >> 8u;
     mask |= mask >> 16u;
     var k = permute_step(i, mask, p);
-#if STRATA_NOT_A_POWER_OF_TWO
     // Fewer than half of all values lie outside; each is sent on until it lies inside.
     while k >= count {
         k = permute_step(k, mask, p);
     }
-#endif
     return (k + p) % count;
 }
 
@@ -79,3 +101,4 @@ fn permute_step(i: u32, mask: u32, p: u32) -> u32 {
     k ^= k >> 5u;
     return k;
 }
+#endif

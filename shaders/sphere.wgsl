@@ -1,5 +1,6 @@
 // Spheres [Haines2019]: with f from centre to origin and b = -f.d, the part l of f across the ray
-// gives the discriminant r^2 - l.l without the cancellation of b^2 - c; the roots are c/q and q.
+// gives the discriminant r^2 - l.l without the cancellation of b^2 - c. The roots are taken as b -+ sqrt(disc): c/q would
+// keep the digits of a small root, but c = f.f - r^2 has lost as many, and what is met is put back on its surface.
 
 struct Sphere {
     center: vec3f,
@@ -14,8 +15,7 @@ fn sphere_outside(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     let b = -dot(f, ray.d);
     let l = f + b * ray.d;
     let disc = s.radius * s.radius - dot(l, l);
-    let c = max(dot(f, f) - s.radius * s.radius, 0.0);
-    let t = c / (b + safe_sqrt(disc));
+    let t = fmax(b - safe_sqrt(disc), 0.0);
     return nearer(hit, disc >= 0.0 && b > 0.0 && ray.face != face, t, key);
 }
 
@@ -27,7 +27,7 @@ fn sphere_shadow(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     let b = -dot(f, ray.d);
     let l = f + b * ray.d;
     let disc = s.radius * s.radius - dot(l, l);
-    let beyond = max(b - hit.t, 0.0);
+    let beyond = fmax(b - hit.t, 0.0);
     let met = disc >= 0.0 && b > 0.0 && beyond * beyond <= disc && ray.face != face;
     return Hit(hit.t, select(hit.key, key, met));
 }
@@ -38,11 +38,9 @@ fn sphere_inside(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     let f = ray.o - s.center;
     let b = -dot(f, ray.d);
     let l = f + b * ray.d;
-    let q = max(abs(b) + safe_sqrt(s.radius * s.radius - dot(l, l)), TINY);
-    let c = dot(f, f) - s.radius * s.radius;
-    let ahead = select(-c / q, q, b > 0.0);
-    let t = select(ahead, 2.0 * b, ray.face == face);
-    return nearer(hit, true, max(t, 0.0), key);
+    let root = safe_sqrt(s.radius * s.radius - dot(l, l));
+    let t = b + select(root, b, ray.face == face);
+    return nearer(hit, true, fmax(t, 0.0), key);
 }
 
 // The boundary of dielectric solid `solid` inside `parent`.
@@ -52,13 +50,11 @@ fn sphere_boundary(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u3
     let b = -dot(f, ray.d);
     let l = f + b * ray.d;
     let disc = s.radius * s.radius - dot(l, l);
-    let q = max(abs(b) + safe_sqrt(disc), TINY);
-    let c = dot(f, f) - s.radius * s.radius;
+    let root = safe_sqrt(disc);
     let on = ray.face == face;
-    let ahead = select(-c / q, q, b > 0.0);
-    let leaving = select(ahead, 2.0 * b, on);
     let enters = ray.medium == parent && disc >= 0.0 && b > 0.0 && !on;
-    return nearer(hit, inside || enters, max(select(c / q, leaving, inside), 0.0), key);
+    let t = b + select(-root, select(root, b, on), inside);
+    return nearer(hit, inside || enters, fmax(t, 0.0), key);
 }
 
 // For shadow rays: whatever starts inside a solid that holds no light is in its shadow.

@@ -76,9 +76,9 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
     // Radially: from the centre of a sphere, from the axis of a cylinder.
     let along = s.axis * dot(s.axis, m);
     let across = m - along;
-    let distance = length(across);
+    let distance2 = dot(across, across);
     // A surface smaller than the rounding of its place may be met at its very centre.
-    let n = select(across / max(distance, TINY), -ray.d, distance == 0.0);
+    let n = select(across * inverseSqrt(fmax(distance2, TINY)), -ray.d, distance2 < TINY);
     let round = Vertex(s.point + along + s.radius * n, n);
 #if FLAT
     if s.shape >= SHAPE_CYLINDER && part == 0u {

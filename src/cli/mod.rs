@@ -79,6 +79,15 @@ fn prepare_environment(command: &Command) {
     };
     // Mesa's layer for choosing among screens complains on stderr where there is no screen.
     set("NODEVICE_SELECT", "1");
+    // llvmpipe takes 256-bit vectors of its own accord; with these a sample has the same bits and costs a quarter less.
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+    {
+        set("LP_NATIVE_VECTOR_WIDTH", "512");
+    }
     let talk = match command {
         Command::Render(args) => Some(args.talk),
         Command::Selftest(args) => Some(args.talk),

@@ -140,7 +140,22 @@ fn facing_plane<'a>(world: &World, list: &'a [Surface], k: usize) -> Option<(usi
     })
 }
 
+/// Whether the last component that is not 0 is positive: true of one of a normal and its opposite.
+fn points_up(normal: DVec3) -> bool {
+    let [x, y, z] = normal.to_array();
+    [z, y, x]
+        .into_iter()
+        .find(|c| *c != 0.0)
+        .is_some_and(|c| c > 0.0)
+}
+
 fn pair_call(world: &World, low: &Surface, high: &Surface) -> String {
+    let points_up = |s: &Surface| matches!(primitive(world, s).geometry, Geometry::Plane { normal, .. } if points_up(normal));
+    let (low, high) = if points_up(low) {
+        (low, high)
+    } else {
+        (high, low)
+    };
     let (a, b) = (primitive(world, low), primitive(world, high));
     let (Geometry::Plane { normal, offset }, Geometry::Plane { offset: far, .. }) =
         (a.geometry, b.geometry)
@@ -220,7 +235,10 @@ fn baked_call(world: &World, s: &Surface) -> String {
     format!("{}(hit, ray, {shape}, {faces}{key}u{solid})", s.function)
 }
 
+/// A two-sided disk; which way its normal points is no matter, and one way makes equal quotients.
 fn disk(center: DVec3, radius: f64, normal: DVec3, offset: f64) -> String {
+    let sign = if points_up(normal) { 1.0 } else { -1.0 };
+    let (normal, offset) = (sign * normal, sign * offset);
     format!(
         "Disk({}, {}, {}, {})",
         vector(center),
@@ -367,8 +385,8 @@ struct Chosen {
     light: DiskLight,
     index: u32,
     cap: Cap,
-    // Of this light among all, and the sum of all weights.
-    probability: f32,
+    // 1 / probability of this light among all, and the sum of all weights.
+    inverse_probability: f32,
     weights: f32,
 }
 
@@ -388,10 +406,7 @@ fn light_choice(world: &World, access: Access) -> String {
             // All weights stay in registers; the first partial sum above u times the whole chooses.
             for (i, l) in world.lights.iter().enumerate() {
                 let _ = writeln!(s, "    let light_{i} = {};", light_literal(l));
-                let _ = writeln!(
-                    s,
-                    "    let w_{i} = light_weight(light_{i}, cap_of(light_{i}, p), n);"
-                );
+                let _ = writeln!(s, "    let w_{i} = light_weight(light_{i}, p, n);");
                 let before = if i == 0 {
                     String::new()
                 } else {
@@ -424,11 +439,11 @@ fn light_choice(world: &World, access: Access) -> String {
     var v = u;
     for (var i = 0u; i < {}u; i++) {{
         let light = lights[i];
-        let w = light_weight(light, cap_of(light, p), n);
+        let w = light_weight(light, p, n);
         sum += w;
         let share = w / select(sum, 1.0, sum <= 0.0);
         let take = v < share;
-        v = select((v - share) / max(1.0 - share, TINY), v / max(share, TINY), take);
+        v = select((v - share) / fmax(1.0 - share, TINY), v / fmax(share, TINY), take);
         index = select(index, i, take);
         chosen = select(chosen, w, take);
     }}
@@ -438,6 +453,6 @@ fn light_choice(world: &World, access: Access) -> String {
         }
     }
     s.push_str("    let light = light_at(index);\n");
-    s.push_str("    return Chosen(light, index, cap_of(light, p), chosen / select(sum, 1.0, sum <= 0.0), sum);\n}\n");
+    s.push_str("    return Chosen(light, index, cap_of(light, p), select(sum / fmax(chosen, TINY), 0.0, chosen <= 0.0), sum);\n}\n");
     s
 }

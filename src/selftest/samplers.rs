@@ -158,7 +158,7 @@ fn cap(b: &Backend) -> Result<Measure, Trouble> {
         let light = DiskLight(vec3f(0.0), x[4], vec3f(0.0, 1.0, 0.0), 0.0, vec3f(1.0), 0u);
         let cap = cap_of(light, vec3f(x[2], x[3], 0.0));
         let s = sample_cap(light, cap, vec2f(x[0], x[1]));
-        y[0] = s.pdf;
+        y[0] = select(0.0, 1.0 / s.inverse_pdf, s.inverse_pdf > 0.0);
         y[1] = s.d.x;
         y[2] = s.d.y;
         y[3] = s.d.z;
@@ -205,7 +205,8 @@ fn choice(b: &Backend, name: &str, access: Access) -> Result<Measure, Trouble> {
     let body = format!(
         "{CLEAR}
         let chosen = choose_light(vec3f(x[2], x[3], 0.0), vec3f(0.0, 1.0, 0.0), x[0]);
-        y[0] = select(-1.0, chosen.probability, chosen.index < 4u && chosen.probability <= 1.0);
+        let p = select(0.0, 1.0 / chosen.inverse_probability, chosen.inverse_probability > 0.0);
+        y[0] = select(-1.0, p, chosen.index < 4u && p <= 1.000001);
         y[1] = chosen.weights;"
     );
     let twin = |world: &crate::world::World, x: &Numbers| {
