@@ -19,15 +19,15 @@ struct Cylinder {
     offsets: vec2f,
 }
 
-// Where a ray is inside the cylinder, and through which part it enters and leaves.
+// Where a ray is inside the cylinder.
 struct Span {
     enter: f32,
     leave: f32,
-    enter_part: u32,
-    leave_part: u32,
-    // Whether the face that a shadow ray aims at is where it enters, or leaves: a light flush on a cap.
-    enter_target: bool,
-    leave_target: bool,
+    // Whether a cap bounds it there, not the side.
+    enter_by_cap: bool,
+    leave_by_cap: bool,
+    // The ray runs up the axis.
+    up: bool,
     // The ray meets the infinite cylinder at all.
     crosses: bool,
 }
@@ -36,13 +36,12 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
     // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0. The product
     // is that of planes and disks, so that what coincides is met at the same distance to the bit.
     let along = dot(c.axis, ray.d);
-    let up = along > 0.0;
     let inv_cos = safe_inverse(along);
     let height = dot(c.axis, ray.o);
     let at_base = select((c.offsets.x - height) * inv_cos, 0.0, ray.face == base);
     let at_top = select((c.offsets.y - height) * inv_cos, 0.0, ray.face == top);
-    let slab_enter = select(at_top, at_base, up);
-    let slab_leave = select(at_base, at_top, up);
+    let slab_enter = fmin(at_base, at_top);
+    let slab_leave = fmax(at_base, at_top);
 
     // The infinite cylinder.
     let from_base = ray.o - c.base;
@@ -52,53 +51,84 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
     let b = dot(m, d);
     let parallel = a < ALONG_AXIS;
     let inv_a = 1.0 / fmax(a, ALONG_AXIS);
-    let w = m - d * (b * inv_a);
-    let excess = dot(m, m) - c.radius * c.radius;
-    let disc = a * (c.radius * c.radius - dot(w, w));
+    let w = m - d * select(b * inv_a, 0.0, parallel);
+    let inside = c.radius * c.radius - dot(w, w);
     // Standing on the side, one root is 0 and the other is known without it: as if the square root were |b|.
-    let root = select(safe_sqrt(disc), abs(b), ray.face == side);
+    let root = select(safe_sqrt(a * inside), abs(b), ray.face == side);
     let near = select((-b - root) * inv_a, -FAR, parallel);
     let far = select((root - b) * inv_a, FAR, parallel);
-
     let by_cap = slab_enter >= near;
     let to_cap = slab_leave < far;
     return Span(
-        fmax(slab_enter, near),
-        fmin(slab_leave, far),
-        select(CYLINDER_SIDE, select(CYLINDER_TOP, CYLINDER_BASE, up), by_cap),
-        select(CYLINDER_SIDE, select(CYLINDER_BASE, CYLINDER_TOP, up), to_cap),
-        by_cap && ray.target_face == select(top, base, up),
-        to_cap && ray.target_face == select(base, top, up),
-        select(disc >= 0.0, excess <= 0.0, parallel),
+        select(near, slab_enter, by_cap),
+        select(far, slab_leave, to_cap),
+        by_cap,
+        to_cap,
+        along > 0.0,
+        inside >= 0.0,
     );
+}
+
+// The parts that a ray enters and leaves by.
+fn enter_part(s: Span) -> u32 {
+    return select(CYLINDER_SIDE, select(CYLINDER_TOP, CYLINDER_BASE, s.up), s.enter_by_cap);
+}
+
+fn leave_part(s: Span) -> u32 {
+    return select(CYLINDER_SIDE, select(CYLINDER_BASE, CYLINDER_TOP, s.up), s.leave_by_cap);
+}
+
+// Whether a ray from outside meets the cylinder.
+fn enters(ray: Ray, s: Span, side: u32, base: u32, top: u32) -> bool {
+    let met = s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
+#if LIT_CAPS
+    // A shadow ray does not meet the cap on which the light that it aims at lies flush.
+    return met && !(s.enter_by_cap && ray.target_face == select(top, base, s.up));
+#else
+    return met;
+#endif
+}
+
+// Whether a ray from inside meets it, as it does but for the cap on which a light lies flush.
+fn leaves(ray: Ray, s: Span, base: u32, top: u32) -> bool {
+#if LIT_CAPS
+    return !(s.leave_by_cap && ray.target_face == select(base, top, s.up));
+#else
+    return true;
+#endif
 }
 
 // For a ray known to be outside.
 fn cylinder_outside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
-    let met = s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side && !s.enter_target;
-    return nearer(hit, met, fmax(s.enter, 0.0), key + s.enter_part);
+    return nearer(hit, enters(ray, s, side, base, top), fmax(s.enter, 0.0), key + enter_part(s));
 }
 
 // For a ray known to be inside.
 fn cylinder_inside(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
-    return nearer(hit, !s.leave_target, fmax(s.leave, 0.0), key + s.leave_part);
+    return nearer(hit, leaves(ray, s, base, top), fmax(s.leave, 0.0), key + leave_part(s));
 }
 
 // The boundary of dielectric solid `solid` inside `parent`.
 fn cylinder_boundary(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
     let inside = ray.medium == solid;
-    let enters = ray.medium == parent && s.crosses && s.enter < s.leave && s.leave > 0.0 && ray.face != side;
     let t = fmax(select(s.enter, s.leave, inside), 0.0);
-    let met = (inside && !s.leave_target) || (enters && !s.enter_target);
-    return nearer(hit, met, t, key + select(s.enter_part, s.leave_part, inside));
+    let met = (inside && leaves(ray, s, base, top)) || (ray.medium == parent && enters(ray, s, side, base, top));
+    return nearer(hit, met, t, key + select(enter_part(s), leave_part(s), inside));
 }
 
 // For shadow rays: whatever starts inside a solid that holds no light is in its shadow.
 fn cylinder_boundary_shadow(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32, solid: u32, parent: u32) -> Hit {
-    let outside = cylinder_outside(hit, ray, c, side, base, top, key);
-    let met = ray.medium == solid || (ray.medium == parent && outside.key != hit.key);
+    let s = cylinder_span(ray, c, side, base, top);
+    let met = ray.medium == solid || (ray.medium == parent && enters(ray, s, side, base, top) && s.enter < hit.t);
+    return Hit(hit.t, select(hit.key, key, met));
+}
+
+// Whether cylinder_outside would meet anything nearer than hit.t: for shadow rays, which need neither distance nor part.
+fn cylinder_shadow(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32) -> Hit {
+    let s = cylinder_span(ray, c, side, base, top);
+    let met = enters(ray, s, side, base, top) && s.enter < hit.t;
     return Hit(hit.t, select(hit.key, key, met));
 }

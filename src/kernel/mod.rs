@@ -13,7 +13,7 @@ pub use select::{Access, BAKED_LIMIT};
 use crate::film::{BLOCK, REPLICATES};
 use crate::scene::Bsdf;
 use crate::settings::{Integrator, LightParts, Settings};
-use crate::world::{AIR, Geometry, World, WorldLight};
+use crate::world::{AIR, Geometry, World, WorldLight, WorldPrimitive};
 use literal::{float, vector};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -275,6 +275,12 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     set("CYLINDER", shape(2));
     set("SPHERE", shape(3));
     set("HUGE", shape(4));
+    let lit = |p: &WorldPrimitive| {
+        let caps = matches!(p.geometry, Geometry::Cylinder { .. }).then_some(&p.faces[1..]);
+        let mut faces = caps.into_iter().flatten();
+        faces.any(|f| world.lights.iter().any(|l| l.face == *f))
+    };
+    set("LIT_CAPS", world.primitives.iter().any(lit));
     set("FLAT", shape(0) || shape(1) || shape(2));
     set("ROUND", shape(2) || shape(3) || shape(4));
 

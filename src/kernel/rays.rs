@@ -83,6 +83,7 @@ fn shadow_function(world: &World, surface: &Surface) -> &'static str {
     let dark = || !primitive(world, surface).holds_light;
     match surface.function {
         "sphere_outside" => "sphere_shadow",
+        "cylinder_outside" => "cylinder_shadow",
         "sphere_boundary" if dark() => "sphere_boundary_shadow",
         "cylinder_boundary" if dark() => "cylinder_boundary_shadow",
         other => other,
@@ -297,8 +298,10 @@ fn hull_faces(world: &World) -> BTreeSet<u32> {
 /// Whether a surface can lie between a point that a path reaches and a light.
 fn can_block(world: &World, s: &Surface, hull: &BTreeSet<u32>) -> bool {
     if s.light {
-        // Flush on the hull it is as much out of the way as the hull.
-        return !hull.contains(&world.lights[s.number].face);
+        // Flush on the hull it is as much out of the way as the hull; and lights of one plane are never between each
+        // other and a point.
+        let face = world.lights[s.number].face;
+        return !hull.contains(&face) && world.lights.iter().any(|l| l.face != face);
     }
     let p = primitive(world, s);
     match p.geometry {
