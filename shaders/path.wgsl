@@ -36,6 +36,8 @@ struct Path {
     depth: u32,
     // The last scattering was specular (or there was none): light met by chance counts whole.
     specular: bool,
+    // Every scattering so far was specular.
+    clear: bool,
 #if SEEN_LIGHTS
     // Camera rays still to be sent for what the sample sees of a light directly, before the path itself.
     glances: u32,
@@ -62,6 +64,7 @@ fn begin(glances: u32) -> Path {
     path.radiance = vec3f(0.0);
     path.depth = 1u;
     path.specular = true;
+    path.clear = true;
 #if SEEN_LIGHTS
     path.glances = glances;
 #endif
@@ -270,7 +273,10 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
         return false;
     }
-    let u = draw(draw_key);
+    var u = draw(draw_key);
+    if (*path).clear {
+        u = draw_spread(u, draw_key.x, draw_key.y, draw_key.w);
+    }
 
 #if LIGHT_SAMPLING
     // Direct light, where the surface scatters into more than one direction.
@@ -408,6 +414,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     (*path).weights = weights;
 #endif
 #endif
+    (*path).clear = (*path).clear && (*path).specular;
     // Russian roulette: short paths are cheap, and cutting them only adds noise.
     let brightest = fmax(fmax(beta.x, beta.y), beta.z);
     var survival = 1.0;

@@ -39,6 +39,28 @@ fn draw(key: vec4u) -> Draws {
     return Draws(unit_float(a), unit_float(b));
 }
 
+// The same for the first vertex that scatters into more than one direction: light choice and point from the additive
+// recurrence of the plastic ratio's kin [Roberts2018], direction from the first two dimensions of Sobol's sequence
+// [Burley2020]. Both run through the samples of one replicate; a shift of its own, modulo 1 and digit by digit, makes
+// every sample uniform and the replicates independent.
+fn draw_spread(u: Draws, pixel: u32, s: u32, seed: u32) -> Draws {
+    let round = s / ROUND_SAMPLES;
+    let i = round / REPLICATES * ROUND_SAMPLES + s % ROUND_SAMPLES;
+    let shift = hash_pixel(pixel, round % REPLICATES, seed ^ 0x5bd1e995u);
+    let more = (shift ^ (shift >> vec2u(16u))) * 0x9e3779b1u;
+    let light = vec3u(shift.x ^ more.y, shift) + i * vec3u(0xd1b54a33u, 0xabc98389u, 0x8cb92ba7u);
+    let x = reverseBits(i);
+    var y = x ^ (x << 16u);
+    y ^= (y & 0x00ff00ffu) << 8u;
+    y ^= (y & 0x0f0f0f0fu) << 4u;
+    y ^= (y & 0x33333333u) << 2u;
+    y ^= (y & 0x55555555u) << 1u;
+    let direction = vec2u(x, y) ^ more;
+    let points = unit_float(vec4u(light.yz, direction));
+    let choice = unit_float(light.xxxx).x;
+    return Draws(points, vec4f(choice, u.choices.yzw));
+}
+
 // Two words for the place in a pixel, which asks for less than light does: few multiplications, for every one of them is
 // paid in every turn of the path loop.
 fn hash_pixel(pixel: u32, s: u32, seed: u32) -> vec2u {
