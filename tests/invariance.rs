@@ -92,6 +92,17 @@ fn check(name: &str) {
             s.clone(),
             (1e-3, DMat3::IDENTITY, DVec3::ZERO),
         ),
+        // Near the ends of the format's range, where fourth powers of lengths leave f32.
+        (
+            "10^13 times as small",
+            s.clone(),
+            (1e-13, DMat3::IDENTITY, DVec3::ZERO),
+        ),
+        (
+            "10^13 times as large",
+            s.clone(),
+            (1e13, DMat3::IDENTITY, DVec3::ZERO),
+        ),
     ];
     let plain = runs(&s, 0);
     for (k, (what, s, (scale, rotation, shift))) in variants.into_iter().enumerate() {

@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn what_means_nothing_does_not_count() {
-        let same: [Edit; 9] = [
+        let same: [Edit; 10] = [
             ("title", |s, _| s.title = None),
             ("path and lines", |s, _| {
                 s.path = "b.toml".into();
@@ -257,6 +257,7 @@ mod tests {
                 s.materials.remove(0);
                 s.primitives.iter_mut().for_each(|p| p.material = 0);
             }),
+            ("order", |s, _| s.primitives.reverse()),
             ("names", |s, _| s.materials[1].name = "snow".into()),
             ("seed, strata, shadow rays", |_, f| {
                 (f.seed, f.strata, f.shadow_rays) = (Some(5), Some(4), Some(3));
