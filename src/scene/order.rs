@@ -274,7 +274,7 @@ mod tests {
         let spread = |k: usize, salt: f64| (k as f64 * 0.618_033_988_749 * salt).fract();
         let shapes: Vec<Shape> = (0..400)
             .map(|k| Shape::Disk {
-                center: DVec3::new(spread(k, 1.0), spread(k, 17.0), spread(k, 131.0)) * 10.0 - 5.0,
+                center: DVec3::new(spread(k, 1.0), spread(k, 17.0), spread(k, 131.0)) * 4.0 - 2.0,
                 normal: DVec3::Y,
                 radius: (-8.0 * spread(k, 1009.0)).exp2(),
             })
