@@ -34,15 +34,15 @@ fn cap_of(light: DiskLight, p: vec3f) -> Cap {
     let s = a2 + h * h - r2;
     // (q - s) / 2h = 2 h r^2 / (q + s), and either form cancels on one side of s = 0.
     let far = s > 0.0;
-#if VAST_LIGHTS
-    // The same without fourth powers of lengths, which overflow: q is the product of the distances to the rim's nearest
+#if EXTREME_LIGHTS
+    // The same without fourth powers of lengths, which leave f32: q is the product of the distances to the rim's nearest
     // and farthest point.
     let a = sqrt(a2);
     let q = length(vec2f(a - light.radius, h)) * length(vec2f(a + light.radius, h));
-    let height = select((q - s) / fmax(2.0 * h, TINY), 2.0 * h * (r2 / fmax(q + s, TINY)), far);
+    let height = select((q - s) / fmax(2.0 * h, TINY), 2.0 * h * (r2 / fmax(q + s, TINY_SQUARE)), far);
 #else
     let q = sqrt(s * s + 4.0 * h * h * r2);
-    let height = select(q - s, 2.0 * h * r2, far) / fmax(select(2.0 * h, q + s, far), TINY);
+    let height = select(q - s, 2.0 * h * r2, far) / fmax(select(2.0 * h, q + s, far), TINY_SQUARE);
 #endif
     return Cap(v, h, a2, s, q, select(0.0, height, h > 0.0));
 }
@@ -61,7 +61,7 @@ fn sample_cap(light: DiskLight, cap: Cap, u: vec2f) -> LightSample {
     let circle = unit_circle(u.y) * rho;
     let d = from_frame(light.normal, vec3f(circle, -depth)) - cap.v;
     let length2 = dot(d, d);
-    let inverse_length = inverseSqrt(fmax(length2, TINY));
+    let inverse_length = inverseSqrt(fmax(length2, TINY_SQUARE));
     let to_disk = cap.h / fmax(cap.h + depth, TINY);
     let sample = cap.height > 0.0 && length2 > 0.0;
     let inverse_pdf = 3.14159265 * cap.height * inverse_length;
@@ -72,7 +72,7 @@ fn sample_cap(light: DiskLight, cap: Cap, u: vec2f) -> LightSample {
 fn cap_pdf(light: DiskLight, cap: Cap, d: vec3f) -> f32 {
     let along = dot(light.normal, d);
     let chord = 2.0 * (cap.s / (2.0 * fmax(cap.h, TINY)) * along - dot(cap.v, d));
-    return select(0.0, fmax(chord, 0.0) / (3.14159265 * fmax(cap.height, TINY)), cap.height > 0.0);
+    return select(0.0, fmax(chord, 0.0) / (3.14159265 * fmax(cap.height, TINY_SQUARE)), cap.height > 0.0);
 }
 
 #if SEVERAL_LIGHTS

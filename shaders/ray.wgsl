@@ -4,6 +4,8 @@
 const FAR: f32 = 3.0e38;
 // Smaller than any length that matters; keeps quotients finite.
 const TINY: f32 = 1.0e-30;
+// The same for squares of lengths, and for what is made of them.
+const TINY_SQUARE: f32 = 1.0e-37;
 // The key of no surface.
 const NONE: u32 = 0xffffffffu;
 // No face: the eye stands on nothing, and an ordinary ray aims at no light.

@@ -78,7 +78,7 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
     let across = m - along;
     let distance2 = dot(across, across);
     // A surface smaller than the rounding of its place may be met at its very centre.
-    let n = select(across * inverseSqrt(fmax(distance2, TINY)), -ray.d, distance2 < TINY);
+    let n = select(across * inverseSqrt(fmax(distance2, TINY_SQUARE)), -ray.d, distance2 < TINY_SQUARE);
     let round = Vertex(s.point + along + s.radius * n, n);
 #if FLAT
     if s.shape >= SHAPE_CYLINDER && part == 0u {

@@ -340,8 +340,8 @@ fn warn(settings: &Settings, counters: &Counters, film: &Film) {
     }
     if let Some(tail) = film.heavy_tail().filter(|t| t.unsafe_mean) {
         say!(
-            "warning: rare bright samples make most of this picture's error (0.1% of its parts carry {} of the mean square), \
-             and it may be larger than stated; more samples will tell",
+            "warning: rare bright samples make this picture's stated error unsafe (0.1 % of its parts carry {} of the mean \
+             square): the error may be larger; more samples will tell",
             percent(tail.top_share)
         );
     }

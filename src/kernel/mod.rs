@@ -17,12 +17,13 @@ use crate::world::{AIR, Geometry, World, WorldLight, WorldPrimitive};
 use literal::{float, vector};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::ops::RangeInclusive;
 
 /// Squared, the camera rays that a sample sends in a pixel that may see a light.
 const GLANCES: u32 = 4;
 
-/// The fourth power of a larger radius comes near the end of f32.
-const VAST_RADIUS: f64 = 1e8;
+/// The fourth powers of radii outside this range come near the ends of f32.
+const ORDINARY_RADII: RangeInclusive<f64> = 1e-8..=1e8;
 
 /// Glances at more surfaces would use up the loop trips that an older driver grants.
 const MOST_GLANCED_AT: u64 = 500;
@@ -289,8 +290,11 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     set("LIGHT_SAMPLING", sampling);
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
     set(
-        "VAST_LIGHTS",
-        world.lights.iter().any(|l| l.radius > VAST_RADIUS),
+        "EXTREME_LIGHTS",
+        world
+            .lights
+            .iter()
+            .any(|l| !ORDINARY_RADII.contains(&l.radius)),
     );
     set("LIGHT_SCALES", world.light_scales.is_some());
     set("SEVERAL_SHADOW_RAYS", settings.shadow_rays > 1);

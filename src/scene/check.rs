@@ -7,6 +7,8 @@ mod geometry;
 mod lights;
 mod open;
 
+pub(super) use coincide::may_coincide;
+
 use super::source::quoted;
 use super::{Bsdf, Diagnostic, Primitive, Scene};
 use glam::DVec3;

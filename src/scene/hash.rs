@@ -2,10 +2,10 @@
 //!
 //! It covers what the scene means and the settings that change what the picture converges to. Values
 //! count as they are read, so two ways to write one surface (a plane through another of its
-//! points) are two scenes: the hash may part what is equal, never join what differs. Order within
-//! a kind of primitive counts, for it decides between surfaces that coincide.
+//! points) are two scenes: the hash may part what is equal, never join what differs. Order in the file counts
+//! among surfaces of one kind that coincide, for there it decides what is met, and nowhere else.
 
-use super::{Bsdf, Camera, Light, Primitive, Scene, Shape};
+use super::{Bsdf, Camera, Light, Primitive, Scene, Shape, order};
 use crate::settings::{Integrator, LightParts, Settings};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
@@ -16,10 +16,11 @@ const DIRECTION_STEP: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// SHA-256, in hexadecimal, of what the picture of `scene` under `settings` converges to.
 ///
-/// Not covered: comments, layout, title, names, materials that nothing uses, and what only moves the
+/// Not covered: comments, layout, title, names, materials that nothing uses, order where it means nothing, and what only moves the
 /// noise (seed, strata, shadow rays).
 pub fn scene_hash(scene: &Scene, settings: &Settings) -> String {
-    let mut h = Hasher(Sha256::new_with_prefix("etendue scene 1\0"));
+    let mut h = Hasher(Sha256::new_with_prefix("etendue scene 2\0"));
+    let scene = &order::canonical(scene);
     h.settings(settings);
     h.camera(&scene.camera);
     h.count(scene.primitives.len());
@@ -245,7 +246,7 @@ mod tests {
 
     #[test]
     fn what_means_nothing_does_not_count() {
-        let same: [Edit; 9] = [
+        let same: [Edit; 10] = [
             ("title", |s, _| s.title = None),
             ("path and lines", |s, _| {
                 s.path = "b.toml".into();
@@ -256,6 +257,7 @@ mod tests {
                 s.materials.remove(0);
                 s.primitives.iter_mut().for_each(|p| p.material = 0);
             }),
+            ("order", |s, _| s.primitives.reverse()),
             ("names", |s, _| s.materials[1].name = "snow".into()),
             ("seed, strata, shadow rays", |_, f| {
                 (f.seed, f.strata, f.shadow_rays) = (Some(5), Some(4), Some(3));

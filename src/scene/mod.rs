@@ -6,6 +6,7 @@
 pub mod check;
 mod format;
 pub mod hash;
+pub(crate) mod order;
 pub mod parse;
 pub mod schema;
 mod source;

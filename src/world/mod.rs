@@ -22,7 +22,7 @@ mod origin;
 
 pub use geometry::Geometry;
 
-use crate::scene::{Bsdf, Scene};
+use crate::scene::{Bsdf, Scene, order};
 use glam::DVec3;
 use media::Media;
 
@@ -120,12 +120,12 @@ pub struct World {
     pub origin: DVec3,
     /// The camera for a picture of the size given to [`World::new`].
     pub camera: WorldCamera,
-    /// Scattering models, as in the scene.
+    /// Scattering models that something has, each once.
     pub materials: Vec<Bsdf>,
     /// Lights that can be met at all; they are met before anything that coincides with them.
     pub lights: Vec<WorldLight>,
     /// Primitives that can be met at all, in the order in which coincident ones are met: disks,
-    /// cylinders, planes, spheres, each in file order.
+    /// cylinders, planes, spheres, each sorted by what it is, but coincident ones in file order.
     pub primitives: Vec<WorldPrimitive>,
     /// Index of refraction of every medium, relative to air: air's, then those of the solids.
     pub indices: Vec<f64>,
@@ -137,6 +137,8 @@ pub struct World {
 impl World {
     /// Prepares `scene` for a picture of `size` pixels.
     pub fn new(scene: &Scene, size: [u32; 2]) -> Self {
+        // From here on nothing depends on the order of the file that means nothing.
+        let scene = &order::canonical(scene);
         let origin = origin::choose_origin(scene);
         let eye = scene.camera.eye - origin;
         let mut primitives: Vec<WorldPrimitive> = Vec::with_capacity(scene.primitives.len());

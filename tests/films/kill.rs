@@ -114,9 +114,10 @@ fn killed_at_random(backend: &str, kills: usize, most: Duration, after_a_save: b
         "only {} of {kills} runs ever saved",
         lost.len()
     );
-    // That it is an interval at most follows from the rule, which has a test of its own without a clock (`saver.rs`). Here,
-    // on a machine that may stall any process, that the rule is followed: half of the kills cost less than three.
-    assert!(median <= Some(&(3 * INTERVAL)), "{median:?} lost");
+    // That it is an interval at most follows from the rule, which has a test of its own without a clock (`saver.rs`). A clock
+    // adds the time of a save and every wait for a processor, so here it is half of the kills: 46 ms where seven processes
+    // wanted each core.
+    assert!(median <= Some(&INTERVAL), "{median:?} lost");
 
     let spp = held + 3;
     let rest = format!("render box.toml --backend {backend} --spp {spp} -o a.png");

@@ -110,12 +110,21 @@ fn faces(shape: &Shape) -> Vec<Face> {
     }
 }
 
+/// Whether shapes of one kind have surfaces that may be in one place, by a generous measure: then their order in the
+/// file decides what is met.
+pub(in crate::scene) fn may_coincide(a: &Shape, b: &Shape) -> bool {
+    // Two surfaces may coincide through a third.
+    const SLACK: f64 = 4.0 * COINCIDENT;
+    let flat = |f: &Face| faces(b).iter().any(|g| coplanar(f, g, SLACK));
+    curved_surfaces_coincide(a, b, SLACK) || faces(a).iter().any(flat)
+}
+
 /// The ranks of two surfaces that coincide and should not.
 fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
     let both_opaque = !a.dielectric && !b.dielectric;
     let alike = both_opaque && a.material.is_some() && a.material == b.material;
     if let (Some(s), Some(t)) = (&a.shape, &b.shape)
-        && curved_surfaces_coincide(s, t)
+        && curved_surfaces_coincide(s, t, COINCIDENT)
         // Overlapping pieces of one opaque thing show the same wherever they are met.
         && (!alike || same_size(s, t))
     {
@@ -123,7 +132,7 @@ fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
     }
     for f in &a.faces {
         for g in &b.faces {
-            if !coplanar(f, g) {
+            if !coplanar(f, g, COINCIDENT) {
                 continue;
             }
             let opposite = f.normal.dot(g.normal) < 0.0;
@@ -156,9 +165,9 @@ fn both_but_one_opaque(a: &Thing, b: &Thing) -> bool {
     a.dielectric != b.dielectric
 }
 
-/// Whether two faces lie in one plane, and over each other.
-fn coplanar(f: &Face, g: &Face) -> bool {
-    if f.normal.cross(g.normal).length() > COINCIDENT {
+/// Whether two faces lie in one plane, and over each other, `within` this fraction of their size.
+fn coplanar(f: &Face, g: &Face, within: f64) -> bool {
+    if f.normal.cross(g.normal).length() > within {
         return false;
     }
     let (small, large) = if f.radius <= g.radius { (f, g) } else { (g, f) };
@@ -172,8 +181,8 @@ fn coplanar(f: &Face, g: &Face) -> bool {
     };
     let apart = large.normal.dot(between);
     let aside = (between - large.normal * apart).length();
-    let touching = f.radius + g.radius - COINCIDENT * size;
-    apart.abs() <= COINCIDENT * size && (aside < touching || large.radius.is_infinite())
+    let touching = f.radius + g.radius - within * size;
+    apart.abs() <= within * size && (aside < touching || large.radius.is_infinite())
 }
 
 fn same_disk(f: &Face, g: &Face) -> bool {
@@ -192,7 +201,7 @@ fn same_size(s: &Shape, t: &Shape) -> bool {
 }
 
 /// Spheres, or sides of cylinders, in one place.
-fn curved_surfaces_coincide(s: &Shape, t: &Shape) -> bool {
+fn curved_surfaces_coincide(s: &Shape, t: &Shape, within: f64) -> bool {
     match (*s, *t) {
         (
             Shape::Sphere { center, radius },
@@ -200,7 +209,7 @@ fn curved_surfaces_coincide(s: &Shape, t: &Shape) -> bool {
                 center: other,
                 radius: r,
             },
-        ) => center.distance(other) + (radius - r).abs() <= COINCIDENT * radius,
+        ) => center.distance(other) + (radius - r).abs() <= within * radius,
         (
             Shape::Cylinder { base, top, radius },
             Shape::Cylinder {
@@ -209,7 +218,7 @@ fn curved_surfaces_coincide(s: &Shape, t: &Shape) -> bool {
                 radius: r,
             },
         ) => {
-            let near = COINCIDENT * radius;
+            let near = within * radius;
             let length = base.distance(top);
             let axis = (top - base) / length;
             let along = |p: DVec3| axis.dot(p - base);

@@ -1,0 +1,315 @@
+//! One order for scenes that mean the same: whoever shuffles a file's tables, or renames its materials, gets the same
+//! bits and the same hash.
+//!
+//! Order in the file matters among surfaces of one kind that coincide, and for nothing else. So everything is sorted by
+//! what it is, and then those that coincide change places among themselves until they stand as in the file.
+
+use super::check::may_coincide;
+use super::{Bsdf, Light, Material, Primitive, Scene, Shape};
+use glam::DVec3;
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, HashMap};
+
+/// The scene in its one order, with the materials that are in use, each once. For 10⁶ primitives it takes a second or two.
+pub(crate) fn canonical(scene: &Scene) -> Scene {
+    let mut s = scene.clone();
+    merge_materials(&mut s);
+
+    let bsdf = |p: &Primitive| s.materials[p.material].bsdf;
+    let in_order = sorted(&s.primitives, primitive_key);
+    let shapes: Vec<Shape> = in_order.iter().map(|&i| s.primitives[i].shape).collect();
+    let decides = |a: usize, b: usize| {
+        let (p, q) = (&s.primitives[in_order[a]], &s.primitives[in_order[b]]);
+        // Of one opaque material, either shows the same.
+        let alike = p.material == q.material && !matches!(bsdf(p), Bsdf::Dielectric { .. });
+        !alike && may_coincide(&p.shape, &q.shape)
+    };
+    let kept = keep_file_order(&in_order, &shapes, decides);
+    s.primitives = kept.iter().map(|&i| s.primitives[i]).collect();
+
+    let in_order = sorted(&s.lights, light_key);
+    let disk = |i: &usize| {
+        let l = &s.lights[*i];
+        Shape::Disk {
+            center: l.center,
+            normal: l.normal,
+            radius: l.radius,
+        }
+    };
+    let shapes: Vec<Shape> = in_order.iter().map(disk).collect();
+    let kept = keep_file_order(&in_order, &shapes, |a, b| {
+        may_coincide(&shapes[a], &shapes[b])
+    });
+    s.lights = kept.iter().map(|&i| s.lights[i]).collect();
+    s
+}
+
+/// Numbers that tell one thing from another.
+type Key = [f64; 12];
+
+fn key(numbers: impl IntoIterator<Item = f64>) -> Key {
+    let mut key = Key::default();
+    for (k, x) in key.iter_mut().zip(numbers) {
+        *k = x + 0.0; // the two zeros are one
+    }
+    key
+}
+
+fn compare(a: &Key, b: &Key) -> Ordering {
+    a.iter()
+        .zip(b)
+        .map(|(x, y)| x.total_cmp(y))
+        .find(|o| o.is_ne())
+        .unwrap_or(Ordering::Equal)
+}
+
+/// Indices into `list` by the keys of what they stand for.
+fn sorted<T>(list: &[T], key: impl Fn(&T) -> Key) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..list.len()).collect();
+    order.sort_by(|&a, &b| compare(&key(&list[a]), &key(&list[b])));
+    order
+}
+
+/// Of lengths and points first: a direction may come out of its normalisation with other last bits.
+fn primitive_key(p: &Primitive) -> Key {
+    let material = p.material as f64;
+    let numbers = |kind: f64, radius: f64, a: DVec3, b: DVec3| {
+        let [a, b] = [a.to_array(), b.to_array()];
+        let geometry = [kind, radius, a[0], a[1], a[2], b[0], b[1], b[2], material];
+        key(geometry)
+    };
+    match p.shape {
+        Shape::Sphere { center, radius } => numbers(0.0, radius, center, DVec3::ZERO),
+        Shape::Plane { point, normal } => numbers(1.0, 0.0, point, normal),
+        Shape::Disk {
+            center,
+            normal,
+            radius,
+        } => numbers(2.0, radius, center, normal),
+        Shape::Cylinder { base, top, radius } => numbers(3.0, radius, base, top),
+    }
+}
+
+fn light_key(l: &Light) -> Key {
+    let vectors = [l.radiance, l.center, l.normal].map(|v| v.to_array());
+    key([l.radius].into_iter().chain(vectors.into_iter().flatten()))
+}
+
+fn bsdf_key(bsdf: &Bsdf) -> Key {
+    let numbers = |kind: f64, a: DVec3, b: DVec3, x: f64| {
+        let vectors = [a, b].map(|v| v.to_array());
+        key([kind, x].into_iter().chain(vectors.into_iter().flatten()))
+    };
+    match *bsdf {
+        Bsdf::Diffuse { reflectance } => numbers(0.0, reflectance, DVec3::ZERO, 0.0),
+        Bsdf::Mirror { reflectance } => numbers(1.0, reflectance, DVec3::ZERO, 0.0),
+        Bsdf::Dielectric { ior, transmittance } => numbers(2.0, transmittance, DVec3::ZERO, ior),
+        Bsdf::Phong {
+            diffuse,
+            specular,
+            exponent,
+        } => numbers(3.0, diffuse, specular, exponent),
+    }
+}
+
+/// Sorts the materials, and leaves out those that nothing uses or that another one equals.
+fn merge_materials(s: &mut Scene) {
+    let mut used = vec![false; s.materials.len()];
+    for p in &s.primitives {
+        used[p.material] = true;
+    }
+    let mut merged: Vec<Material> = Vec::new();
+    let mut index = vec![0; s.materials.len()];
+    for i in sorted(&s.materials, |m| bsdf_key(&m.bsdf)) {
+        if !used[i] {
+            continue;
+        }
+        let bsdf = s.materials[i].bsdf;
+        if merged.last().is_none_or(|m| m.bsdf != bsdf) {
+            merged.push(s.materials[i].clone());
+        }
+        index[i] = merged.len() - 1;
+    }
+    for p in &mut s.primitives {
+        p.material = index[p.material];
+    }
+    s.materials = merged;
+}
+
+/// `order` with those indices in ascending order among themselves that `decides` joins, directly or through others.
+/// `shapes` are those of the things in `order`, as `decides` gets its arguments from there.
+fn keep_file_order(
+    order: &[usize],
+    shapes: &[Shape],
+    decides: impl Fn(usize, usize) -> bool,
+) -> Vec<usize> {
+    let mut groups = Groups((0..order.len()).collect());
+    for_each_near_pair(shapes, |a, b| {
+        if groups.root(a) != groups.root(b) && decides(a, b) {
+            groups.join(a, b);
+        }
+    });
+    let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for k in 0..order.len() {
+        let root = groups.root(k);
+        if root != k {
+            members.entry(root).or_insert_with(|| vec![root]).push(k);
+        }
+    }
+    let mut kept = order.to_vec();
+    for places in members.values_mut() {
+        places.sort_unstable();
+        let mut things: Vec<usize> = places.iter().map(|&k| order[k]).collect();
+        things.sort_unstable();
+        for (&place, thing) in places.iter().zip(things) {
+            kept[place] = thing;
+        }
+    }
+    kept
+}
+
+/// Disjoint sets, by the parent of every element.
+struct Groups(Vec<usize>);
+
+impl Groups {
+    fn root(&mut self, mut k: usize) -> usize {
+        while self.0[k] != k {
+            self.0[k] = self.0[self.0[k]];
+            k = self.0[k];
+        }
+        k
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+/// A ball that meets that of every other shape of the kind with which this one may coincide.
+fn place(shape: &Shape) -> (DVec3, f64) {
+    // Ten times the tolerance: what coincides with one thing may coincide with another through it.
+    const SLACK: f64 = 10.0 * crate::world::COINCIDENT;
+    let (center, reach) = match *shape {
+        Shape::Sphere { center, radius } => (center, SLACK * radius),
+        // The point nearest the file's origin is the same for either direction of the normal.
+        Shape::Plane { point, normal } => {
+            let foot = normal * normal.dot(point);
+            (foot, SLACK * foot.length())
+        }
+        Shape::Disk { center, radius, .. } => (center, (1.0 + SLACK) * radius),
+        Shape::Cylinder { base, top, radius } => (
+            (base + top) / 2.0,
+            (1.0 + SLACK) * (base.distance(top) / 2.0).hypot(radius),
+        ),
+    };
+    // Not finer than f64, which the cells are counted in.
+    (center, reach.max(1e-12 * center.length()).max(1e-30))
+}
+
+fn kind(shape: &Shape) -> u8 {
+    match shape {
+        Shape::Sphere { .. } => 0,
+        Shape::Plane { .. } => 1,
+        Shape::Disk { .. } => 2,
+        Shape::Cylinder { .. } => 3,
+    }
+}
+
+/// Where a ball is looked for: kind of shape, power of two of the ball's radius, cell of a grid that is coarse for it.
+type Cell = (u8, i32, [i64; 3]);
+
+/// Edge of a cell over the largest radius of a ball in its grid: most balls meet one cell.
+const CELL: f64 = 8.0;
+
+/// Calls `visit` with all pairs of shapes of one kind whose balls meet, and some more.
+fn for_each_near_pair(shapes: &[Shape], mut visit: impl FnMut(usize, usize)) {
+    let places: Vec<(DVec3, f64)> = shapes.iter().map(place).collect();
+    let level = |reach: f64| reach.log2().ceil() as i32;
+    let mut cells: HashMap<Cell, Vec<usize>> = HashMap::new();
+    let mut levels: BTreeMap<u8, Vec<i32>> = BTreeMap::new();
+    for (k, (shape, (center, reach))) in shapes.iter().zip(&places).enumerate() {
+        let l = level(*reach);
+        let edge = CELL * f64::from(l).exp2();
+        let at = (*center / edge).to_array().map(|x| x.floor() as i64);
+        cells.entry((kind(shape), l, at)).or_default().push(k);
+        let known = levels.entry(kind(shape)).or_default();
+        if let Err(at) = known.binary_search(&l) {
+            known.insert(at, l);
+        }
+    }
+    for (k, (shape, (center, reach))) in shapes.iter().zip(&places).enumerate() {
+        let own = level(*reach);
+        for &l in levels[&kind(shape)].iter().filter(|l| **l >= own) {
+            let radius = f64::from(l).exp2();
+            let cell = |p: DVec3| (p / (CELL * radius)).to_array().map(|x| x.floor() as i64);
+            let (low, high) = (
+                cell(*center - reach - radius),
+                cell(*center + reach + radius),
+            );
+            for x in low[0]..=high[0] {
+                for y in low[1]..=high[1] {
+                    for z in low[2]..=high[2] {
+                        let there = cells.get(&(kind(shape), l, [x, y, z]));
+                        for &m in there.into_iter().flatten() {
+                            // Pairs of one level are found from either side.
+                            if level(places[m].1) > own || m < k {
+                                visit(m, k);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_pairs_are_all_that_a_search_of_every_pair_finds() {
+        // A spread of sizes and places with no pattern to it: the golden ratio's multiples.
+        let spread = |k: usize, salt: f64| (k as f64 * 0.618_033_988_749 * salt).fract();
+        let shapes: Vec<Shape> = (0..400)
+            .map(|k| Shape::Disk {
+                center: DVec3::new(spread(k, 1.0), spread(k, 17.0), spread(k, 131.0)) * 4.0 - 2.0,
+                normal: DVec3::Y,
+                radius: (-8.0 * spread(k, 1009.0)).exp2(),
+            })
+            .collect();
+        let meet = |a: usize, b: usize| {
+            let ((c, r), (d, s)) = (place(&shapes[a]), place(&shapes[b]));
+            c.distance(d) <= r + s
+        };
+        let mut found = Vec::new();
+        for_each_near_pair(&shapes, |a, b| {
+            if meet(a, b) {
+                found.push((a.min(b), a.max(b)));
+            }
+        });
+        found.sort_unstable();
+        let mut all = Vec::new();
+        for b in 0..shapes.len() {
+            all.extend((0..b).filter(|&a| meet(a, b)).map(|a| (a, b)));
+        }
+        all.sort_unstable();
+        assert!(all.len() > 100, "{}", all.len());
+        assert_eq!(found, all);
+    }
+
+    #[test]
+    fn file_order_stays_where_joined_and_nowhere_else() {
+        let ball = |x: f64| Shape::Sphere {
+            center: DVec3::X * x,
+            radius: 1.0,
+        };
+        // Things 0 to 4 of a file, of which 0, 2 and 4 are in one place, sorted as 4, 3, 2, 1, 0.
+        let shapes = [ball(0.0), ball(5.0), ball(0.0), ball(9.0), ball(0.0)];
+        let order = [4, 3, 2, 1, 0];
+        let joined = |a: usize, b: usize| shapes[a] == shapes[b];
+        assert_eq!(keep_file_order(&order, &shapes, joined), [0, 3, 2, 1, 4]);
+        assert_eq!(keep_file_order(&order, &shapes, |_, _| false), order);
+    }
+}
