@@ -88,6 +88,8 @@ fn light_weight(light: DiskLight, p: vec3f, n: vec3f) -> f32 {
     let above = fmax(dot(n, to) + light.radius, 0.0);
     let luminance = dot(light.radiance, vec3f(0.2126, 0.7152, 0.0722));
     let facing = h + light.radius * (r2 * inverse);
-    return select(0.0, luminance * r2 * (facing * above * inverse * inverse), h > 0.0);
+    // Factors without unit: a compiler may take them in any order, and products of many lengths leave f32.
+    let per_length = light.radius * inverse;
+    return select(0.0, luminance * (facing * per_length) * (above * per_length), h > 0.0);
 }
 #endif

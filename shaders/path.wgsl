@@ -275,7 +275,9 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     }
     var u = draw(draw_key);
     if (*path).clear {
-        u = draw_spread(u, draw_key.x, draw_key.y, draw_key.w);
+        let round = draw_key.y / ROUND_SAMPLES;
+        let i = round / REPLICATES * ROUND_SAMPLES + draw_key.y % ROUND_SAMPLES;
+        u = draw_spread(u, draw_key.x, round % REPLICATES, i, draw_key.w);
     }
 
 #if LIGHT_SAMPLING

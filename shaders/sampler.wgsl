@@ -41,12 +41,10 @@ fn draw(key: vec4u) -> Draws {
 
 // The same for the first vertex that scatters into more than one direction: light choice and point from the additive
 // recurrence of the plastic ratio's kin [Roberts2018], direction from the first two dimensions of Sobol's sequence
-// [Burley2020]. Both run through the samples of one replicate; a shift of its own, modulo 1 and digit by digit, makes
+// [Burley2020]. Both run through the samples i of one replicate; a shift of its own, modulo 1 and digit by digit, makes
 // every sample uniform and the replicates independent.
-fn draw_spread(u: Draws, pixel: u32, s: u32, seed: u32) -> Draws {
-    let round = s / ROUND_SAMPLES;
-    let i = round / REPLICATES * ROUND_SAMPLES + s % ROUND_SAMPLES;
-    let shift = hash_pixel(pixel, round % REPLICATES, seed ^ 0x5bd1e995u);
+fn draw_spread(u: Draws, pixel: u32, replicate: u32, i: u32, seed: u32) -> Draws {
+    let shift = hash_pixel(pixel, replicate, seed ^ 0x5bd1e995u);
     let more = (shift ^ (shift >> vec2u(16u))) * 0x9e3779b1u;
     let light = vec3u(shift.x ^ more.y, shift) + i * vec3u(0xd1b54a33u, 0xabc98389u, 0x8cb92ba7u);
     let x = reverseBits(i);

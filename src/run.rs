@@ -25,6 +25,9 @@ const SHOWN_CHECK_FACTOR: f64 = 4.0;
 /// The fewest samples at which the error may end a run.
 const MIN_CHECKED_SAMPLES: u64 = 16;
 
+/// The fewest samples at which it is shown.
+const MIN_SHOWN_SAMPLES: u64 = 64;
+
 /// What is to be done.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
@@ -120,11 +123,11 @@ fn columns(r: Rect) -> impl Iterator<Item = Rect> {
 /// spaced by a factor, from [`MIN_CHECKED_SAMPLES`].
 fn next_check(count: u64, job: &Job) -> u64 {
     let period = job.round * REPLICATES as u64;
-    let factor = match job.error {
-        Some(_) => CHECK_FACTOR,
-        None => SHOWN_CHECK_FACTOR,
+    let (first, factor) = match job.error {
+        Some(_) => (MIN_CHECKED_SAMPLES, CHECK_FACTOR),
+        None => (MIN_SHOWN_SAMPLES, SHOWN_CHECK_FACTOR),
     };
-    let mut check = MIN_CHECKED_SAMPLES.div_ceil(period) * period;
+    let mut check = first.div_ceil(period) * period;
     while check <= count {
         let next = (check as f64 * factor).ceil() as u64;
         check = next.div_ceil(period) * period;
@@ -185,7 +188,7 @@ impl<'a> Run<'a> {
     ) -> Result<StopReason, E> {
         let job = self.job;
         let mut at = job.samples.start;
-        loop {
+        'passes: loop {
             at = first_missing(&self.film.coverage, job, at);
             let count = at - job.samples.start;
             let check = next_check(count.saturating_sub(1), job);
@@ -197,6 +200,7 @@ impl<'a> Run<'a> {
             }
             let next = next_check(count, job);
             let end = self.pass_end(at).min(job.samples.start + next);
+            let learning = self.pace.is_none();
             for tile in &job.tiles {
                 for (rect, ranges) in self.film.coverage.missing(*tile, at..end) {
                     for part in ranges {
@@ -211,6 +215,10 @@ impl<'a> Run<'a> {
                         }
                         self.tally.forecast = self.forecast();
                         after(self.film, &self.tally)?;
+                        // One call tells the pace; all others are of the right length.
+                        if learning {
+                            continue 'passes;
+                        }
                     }
                 }
             }
@@ -235,7 +243,7 @@ impl<'a> Run<'a> {
     }
 
     /// Where a pass that starts at `at` ends: at the end of the block, of the job, or of what a call can do in time. The
-    /// first is one sample long, and tells the pace.
+    /// first is one sample long.
     fn pass_end(&self, at: u64) -> u64 {
         let block_end = (at / BLOCK + 1) * BLOCK;
         let mut length = 1;

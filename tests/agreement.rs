@@ -44,7 +44,7 @@ fn cpu_runs(s: &Scene, spp: u64, estimator: Estimator) -> Vec<Vec<[f64; 3]>> {
 }
 
 fn agree(s: &Scene) -> Result<(), Failed> {
-    let reference = cpu_runs(s, 48, Estimator::LightSampling);
+    let reference = cpu_runs(s, 64, Estimator::LightSampling);
     compare(
         "GPU against reference",
         &gpu_runs(s, 192, None, 0),

@@ -17,7 +17,7 @@ const CPU_TILE_PIXELS: u64 = 1 << 16;
 
 /// Pixels that a software adapter is given at once: in a call's time it takes many samples of each, and its lanes wait
 /// less for each other's longer paths.
-const SOFTWARE_TILE_PIXELS: u64 = 1 << 16;
+const SOFTWARE_TILE_PIXELS: u64 = 1 << 14;
 
 /// An engine, and what the renderer must know about it.
 pub struct Chosen {

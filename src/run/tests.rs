@@ -212,7 +212,7 @@ fn checks_are_whole_rounds_of_all_replicates() {
         let counts = std::iter::successors(Some(next_check(0, job)), after);
         counts.take(6).collect::<Vec<_>>()
     };
-    assert_eq!(checks(&job), [16, 64, 256, 1024, 4096, 16384]);
+    assert_eq!(checks(&job), [64, 256, 1024, 4096, 16384, 65536]);
     job.error = Some(0.1);
     assert_eq!(checks(&job), [16, 32, 48, 64, 80, 112]);
     job.round = 1;
@@ -242,7 +242,7 @@ fn a_failing_device_leaves_what_was_done() {
     let mut film = Film::new(size, Rect::whole(size), 2);
     let job = job(size, 64, 0..64);
     let mut engine = Fake::new();
-    engine.fail_at = Some(2);
+    engine.fail_at = Some(1);
     let stop = AtomicBool::new(false);
     let mut run = Run::new(&job, &mut engine, &mut film, &stop);
     let e = run.go(|_, _| Ok::<(), EngineError>(())).unwrap_err();
