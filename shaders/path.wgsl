@@ -15,6 +15,9 @@ struct Params {
     // which hands each thread a contiguous share gives all of them the same picture to do.
     groups: u32,
     stride: u32,
+    // 1: goes on where the last dispatch could not finish its samples for want of loop trips; and how many there are.
+    resume: u32,
+    trips: u32,
 }
 
 @group(1) @binding(0) var<uniform> params: Params;
@@ -24,6 +27,18 @@ struct Params {
 // For each pixel of the tile: rays; truncated paths, and in the upper half 1 + the place in its block of the first sample
 // that was not finite; how many of those replicates 0 and 1 had, in a half each; and replicates 2 and 3.
 @group(1) @binding(3) var<storage, read_write> counters: array<vec4u>;
+
+#if TREE
+// What is left to a later dispatch for want of loop trips.
+struct Left {
+    // How many pixels have unfinished samples, and 1 + the last of those of which not one sample could be finished.
+    unfinished: atomic<u32>,
+    stuck: atomic<u32>,
+    // For each replicate and pixel of the tile: the sample to begin with.
+    next: array<u32>,
+}
+@group(1) @binding(4) var<storage, read_write> left: Left;
+#endif
 
 struct Path {
     ray: Ray,
@@ -137,6 +152,17 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var count = counters[index];
 
     var i = params.first;
+#if TREE
+    let place = params.replicate * params.size.x * params.size.y + index;
+    if params.resume == 1u {
+        i = left.next[place];
+    }
+    let first = i;
+    // A sample that uses up the trips is begun again by the next dispatch: nothing of it is kept.
+    trips_left = params.trips - min(params.trips, TRIPS_AT_START + TRIPS_AT_VERTEX);
+    var before = count;
+    var going = true;
+#endif
     var s = sample_number(i, params.replicate);
 #if SEEN_LIGHTS
     let glances = glances_at(pixel);
@@ -146,7 +172,11 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var path = begin(glances);
     path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances));
     // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
+#if TREE
+    while i < params.end && going {
+#else
     while i < params.end {
+#endif
         var alive = false;
         let hit = intersect(path.ray);
         count.x += 1u;
@@ -169,6 +199,14 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             alive = scatter_at(&path, hit, vec4u(key, s, path.depth, params.seed), &count);
         }
 
+#if TREE
+        trips_left -= min(trips_left, TRIPS_AT_VERTEX);
+        if trips_left == 0u {
+            going = false;
+            count = before;
+            alive = true;
+        }
+#endif
         var glances_left = 0u;
 #if SEEN_LIGHTS
         if glance {
@@ -197,11 +235,21 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             s = sample_number(i, params.replicate);
             path = begin(glances);
             glances_left = glances;
+#if TREE
+            before = count;
+#endif
         }
         if !alive {
             path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances_left));
         }
     }
+#if TREE
+    left.next[place] = i;
+    if i < params.end {
+        atomicAdd(&left.unfinished, 1u);
+        atomicMax(&left.stuck, select(0u, index + 1u, i == first));
+    }
+#endif
     textureStore(running_out, texel, params.replicate, sum);
     counters[index] = count;
 }
@@ -216,8 +264,12 @@ fn emission(path: Path, hit: Hit) -> vec3f {
     if !path.specular {
         let cap = cap_of(light, path.ray.o);
         var pdf = cap_pdf(light, cap, path.ray.d);
+#if LIGHT_TREE
+        pdf *= light_probability(hit.key >> 2u, path.ray.o, path.n);
+#else
 #if SEVERAL_LIGHTS
         pdf *= light_weight(light, cap, path.n) / max(path.weights, TINY);
+#endif
 #endif
         share *= select(0.0, power_heuristic(path.pdf, SHADOW_RAYS * pdf), path.pdf > 0.0);
     }
@@ -272,17 +324,30 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         for (var k = 0u; k < u32(SHADOW_RAYS); k++) {
             var points = u.points.xy;
             var choice = u.choices.x;
+#if LIGHT_TREE
+            var spare = u.choices.w;
+#endif
             if k > 0u {
                 let more = draw(draw_key + vec4u(0u, 0u, k << 20u, 0u));
                 points = more.points.xy;
                 choice = more.choices.x;
+#if LIGHT_TREE
+                spare = more.choices.w;
+#endif
             }
             choice = (choice + f32(k)) * (1.0 / SHADOW_RAYS);
 #else
             let points = u.points.xy;
             let choice = u.choices.x;
+#if LIGHT_TREE
+            let spare = u.choices.w;
 #endif
+#endif
+#if LIGHT_TREE
+            let chosen = choose_light(v.p, n, vec2f(choice, spare));
+#else
             let chosen = choose_light(v.p, n, choice);
+#endif
             weights = chosen.weights;
             let to = sample_cap(chosen.light, chosen.cap, points);
             let cos = dot(n, to.d);

@@ -115,22 +115,19 @@ impl GpuEngine {
                 kernel.trips_per_sample, settings.max_depth
             )));
         }
-        let packed = pack(world);
+        let packed = pack(world, kernel.access);
         let device = &gpu.device;
         let limit = device.limits().max_storage_buffer_binding_size;
-        let bytes = size_of_val(&packed.surfaces[..]) as u64;
-        if bytes > limit {
-            return Err(unable(format!(
-                "{} surfaces need a storage buffer of {bytes} bytes, it binds {limit} at most",
-                packed.surfaces.len()
-            )));
+        if let Some(problem) = scene::too_large(&packed, limit) {
+            return Err(unable(problem));
         }
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let oom = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         // SAFETY: without runtime checks the kernel must not index out of bounds or loop for ever. All its
         // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
         // length, or pixels that it compares with the tile's size first; its loops run over constant
-        // ranges, or over samples, each at most max_depth vertices and some glances long.
+        // ranges, over samples, each at most max_depth vertices and some glances long, or along nodes whose
+        // next ones always have higher numbers.
         let module = unsafe {
             device.create_shader_module_trusted(
                 wgpu::ShaderModuleDescriptor {
@@ -218,7 +215,7 @@ impl GpuEngine {
         let mut place = [Some(0); REPLICATES];
         let tile = self.tile.as_ref().ok_or("no tile")?;
         tile.upload(&self.gpu, &[Default::default()]);
-        self.submit(rect, 0..0, &mut place, true)?;
+        self.dispatch(rect, 0..0, &mut place, true, false)?;
         self.tile = None;
         Ok(())
     }
@@ -236,7 +233,8 @@ impl GpuEngine {
                 .gpu
                 .device
                 .push_error_scope(wgpu::ErrorFilter::Validation);
-            let tile = Tile::new(&self.gpu, &self.film_layout, &self.params, size);
+            let counts = self.counts_trips();
+            let tile = Tile::new(&self.gpu, &self.film_layout, &self.params, size, counts);
             let invalid = pollster::block_on(invalid.pop());
             // What failed for want of memory is invalid where it is used: the first cause is told.
             if let Some(e) = pollster::block_on(oom.pop()).or(invalid) {
@@ -250,15 +248,49 @@ impl GpuEngine {
         Ok(())
     }
 
-    /// Dispatches `samples` of every pixel of `rect`, a dispatch for each replicate that owns some, and
-    /// waits. `place` says which texture holds a replicate's running sums (`None`: they start at zero);
-    /// `empty` dispatches without samples.
+    /// Whether the kernel counts its loop trips and leaves what it cannot finish.
+    fn counts_trips(&self) -> bool {
+        self.kernel.access == Access::Tree
+    }
+
+    /// Dispatches `samples` of every pixel of `rect` until all are done.
     fn submit(
         &mut self,
         rect: Rect,
         samples: Range<u64>,
         place: &mut [Option<usize>; REPLICATES],
+    ) -> Result<(), String> {
+        self.dispatch(rect, samples.clone(), place, false, false)?;
+        while self.counts_trips() {
+            let [unfinished, stuck] = self.tile.as_ref().ok_or("no tile")?.left(&self.gpu)?;
+            if unfinished == 0 {
+                break;
+            }
+            if stuck > 0 {
+                let (x, y) = ((stuck - 1) % rect.width(), (stuck - 1) / rect.width());
+                return Err(format!(
+                    "one path of pixel {}, {} takes more than {} loop trips, and this driver silently stops an \
+                     invocation at 65535; lower max_depth or use --backend cpu",
+                    rect.x0 + x,
+                    rect.y0 + y,
+                    self.gpu.trip_limit
+                ));
+            }
+            self.dispatch(rect, samples.clone(), place, false, true)?;
+        }
+        Ok(())
+    }
+
+    /// Dispatches `samples` of every pixel of `rect`, a dispatch for each replicate that owns some, and
+    /// waits. `place` says which texture holds a replicate's running sums (`None`: they start at zero);
+    /// `empty` dispatches without samples, `resume` goes on with what the last call could not finish.
+    fn dispatch(
+        &mut self,
+        rect: Rect,
+        samples: Range<u64>,
+        place: &mut [Option<usize>; REPLICATES],
         empty: bool,
+        resume: bool,
     ) -> Result<(), String> {
         let tile = self.tile.as_ref().ok_or("no tile")?;
         let round = u64::from(self.strata) * u64::from(self.strata);
@@ -267,6 +299,7 @@ impl GpuEngine {
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        tile.clear_left(&mut encoder);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
@@ -287,6 +320,8 @@ impl GpuEngine {
                     seed: self.seed,
                     groups,
                     stride: coprime_stride(groups),
+                    resume: u32::from(resume),
+                    trips: u32::try_from(self.gpu.trip_limit).unwrap_or(u32::MAX),
                     padding: 0,
                 };
                 self.gpu.queue.write_buffer(
@@ -340,7 +375,7 @@ impl GpuEngine {
         tile.clear_counters(&mut encoder);
         self.gpu.queue.submit([encoder.finish()]);
 
-        let most = (self.gpu.trip_limit / self.kernel.trips_per_sample).max(1);
+        let most = (self.gpu.trip_limit / self.kernel.trips_per_sample.max(1)).max(1);
         let pixels = rect.area() as f64;
         let mut at = samples.start;
         while at < samples.end {
@@ -353,7 +388,7 @@ impl GpuEngine {
             };
             let count = affordable.clamp(1, most.min(samples.end - at));
             let start = Instant::now();
-            self.submit(rect, at..at + count, &mut place, false)
+            self.submit(rect, at..at + count, &mut place)
                 .map_err(device_error)?;
             let cost = start.elapsed().as_secs_f64() / (count as f64 * pixels);
             self.seconds_per_path =

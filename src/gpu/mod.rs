@@ -4,6 +4,8 @@ mod adapters;
 mod engine;
 pub mod pack;
 pub mod probe;
+#[cfg(test)]
+mod same_hits;
 mod scene;
 mod tile;
 
