@@ -34,7 +34,7 @@ struct Left {
     // How many pixels have unfinished samples, and 1 + the last of those of which not one sample could be finished.
     unfinished: atomic<u32>,
     stuck: atomic<u32>,
-    // For each replicate and pixel of the tile: the sample to begin with.
+    // For each replicate and pixel of the tile: the sample to begin with. Then for each pixel: 1 if it may see a light.
     next: array<u32>,
 }
 @group(1) @binding(4) var<storage, read_write> left: Left;
@@ -91,6 +91,13 @@ fn begin(glances: u32) -> Path {
 // How many camera rays a sample of this pixel sends for what it sees of a light directly. The edge of a light is by far
 // the noisiest thing in most pictures, and a camera ray costs a tenth of a path. Any answer is right; this one holds
 // where the light's disk comes near the pixel, to first order.
+#if TREE
+// Where lights are many the host has looked for them.
+fn glances_at(index: u32) -> u32 {
+    let seen = left.next[REPLICATES * params.size.x * params.size.y + index];
+    return select(0u, GLANCES * GLANCES, seen == 1u);
+}
+#else
 fn glances_at(pixel: vec2u) -> u32 {
     let at = vec2f(pixel) + 0.5 - CAMERA_CENTER;
     let w = CAMERA_FORWARD + at.x * CAMERA_DX + at.y * CAMERA_DY;
@@ -115,6 +122,7 @@ fn glances_at(pixel: vec2u) -> u32 {
     }
     return glances;
 }
+#endif
 #endif
 
 // Whether light scattered this often on its way to the eye is kept.
@@ -165,7 +173,11 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 #endif
     var s = sample_number(i, params.replicate);
 #if SEEN_LIGHTS
+#if TREE
+    let glances = glances_at(index);
+#else
     let glances = glances_at(pixel);
+#endif
 #else
     let glances = 0u;
 #endif

@@ -2,6 +2,7 @@
 
 use super::adapters::WORKGROUP;
 use super::pack::{Params, pack};
+use super::seen::SeenLights;
 use super::tile::{self, Tile};
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
@@ -30,6 +31,8 @@ pub struct GpuEngine {
     film_layout: wgpu::BindGroupLayout,
     params: wgpu::Buffer,
     tile: Option<Tile>,
+    /// Where lights are seen, if the kernel asks the host.
+    seen: Option<SeenLights>,
     /// What the tile's textures hold since the last call, as it was read back.
     held: Option<Held>,
     strata: u32,
@@ -166,6 +169,7 @@ impl GpuEngine {
         if let Some(error) = errors.into_iter().flatten().next() {
             return Err(unable(format!("the kernel was refused: {error}")));
         }
+        let counts_trips = kernel.access == Access::Tree;
         let mut engine = Self {
             kernel,
             pipeline,
@@ -173,6 +177,7 @@ impl GpuEngine {
             film_layout,
             params,
             tile: None,
+            seen: counts_trips.then(|| SeenLights::new(world, settings.size)),
             held: None,
             strata: settings.strata,
             seed: settings.seed,
@@ -352,6 +357,9 @@ impl GpuEngine {
             .tile
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
+        if let Some(seen) = &self.seen {
+            tile.upload_seen(&self.gpu, &seen.mark(rect));
+        }
         let mut place = [None; REPLICATES];
         let held = self.held.take();
         if !samples.start.is_multiple_of(BLOCK) {

@@ -7,6 +7,7 @@ pub mod probe;
 #[cfg(test)]
 mod same_hits;
 mod scene;
+mod seen;
 mod tile;
 
 pub use adapters::{AdapterReport, Choice, Gpu, adapters};

@@ -71,7 +71,7 @@ impl Tile {
         });
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let nexts = if counts_trips {
-            pixels * REPLICATES as u64
+            pixels * (REPLICATES as u64 + 1)
         } else {
             1
         };
@@ -136,6 +136,13 @@ impl Tile {
             left,
             staging,
         }
+    }
+
+    /// Says which pixels, rows of the tile, may see a light.
+    pub fn upload_seen(&self, gpu: &Gpu, seen: &[u32]) {
+        let at = LEFT_HEAD + 4 * (REPLICATES * seen.len()) as u64;
+        gpu.queue
+            .write_buffer(&self.left, at, bytemuck::cast_slice(seen));
     }
 
     /// Nothing is left, before a dispatch.

@@ -169,7 +169,7 @@ fn trips_at_start(world: &World, access: Access, features: &BTreeSet<&str>) -> u
         Access::Baked | Access::Tree => 0,
     };
     if features.contains("SEEN_LIGHTS") {
-        world.lights.len() as u64 + u64::from(GLANCES * GLANCES) * (1 + ray) + strata_loop
+        u64::from(GLANCES * GLANCES) * (1 + ray) + strata_loop
     } else {
         strata_loop
     }
@@ -337,11 +337,7 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
     set(
         "SEEN_LIGHTS",
         settings.light.emitted
-            && match access {
-                // Every dispatch looks at all lights for every pixel.
-                Access::Tree => world.lights.len() <= lights::MOST_LOOKED_AT,
-                Access::Baked | Access::Buffers => surfaces(world) <= MOST_GLANCED_AT,
-            }
+            && (access == Access::Tree || surfaces(world) <= MOST_GLANCED_AT)
             && world.lights.iter().any(faces_eye),
     );
     set("WHITTED", settings.integrator == Integrator::Whitted);

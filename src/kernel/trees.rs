@@ -11,7 +11,7 @@ use crate::world::{Bounds, World};
 use std::fmt::Write as _;
 
 /// A kind with fewer members is met one by one in a scene that needs trees: as fast up to here.
-const LEAST_IN_TREE: usize = 12;
+const LEAST_IN_TREE: usize = 24;
 
 /// Nodes that a trip of a walk's loop visits: the trips that older drivers grant go farther, and it costs nothing.
 const VISITS_A_TRIP: usize = 2;
@@ -125,10 +125,10 @@ pub(super) fn walks(world: &World, parted: &Parted, shadows: bool) -> String {
     s
 }
 
-/// The loop of a walk: `leaf` for what to do at one.
+/// The loop of a walk, which goes on while `going_on`: `leaf` for what to do at one.
 fn walk(group: &Group, going_on: &str, leaf: &str) -> String {
     let (header, end) = (group.header, group.end());
-    let mut s = format!(
+    let start = format!(
         "    var hit = first;
     let slabs = slabs_of(ray, bitcast<f32>(nodes[{}u].x));
     var node = {}u;
@@ -138,25 +138,39 @@ fn walk(group: &Group, going_on: &str, leaf: &str) -> String {
         2 * header,
         header + 1
     );
-    // The box of a leaf that holds its sphere is not there; the sphere itself is as cheap.
-    let (enter, within) = if group.spheres() {
-        ("", "leaf || ")
-    } else {
-        ("met && ", "")
-    };
-    for _ in 0..VISITS_A_TRIP {
-        let _ = writeln!(
-            s,
-            "        {{
+    let visit = "
             let a = nodes[2u * node];
             let b = nodes[2u * node + 1u];
             let leaf = b.w != 0u;
-            let i = select(0u, (b.w >> 1u) - 1u, leaf);
             let met = meets_box(slabs, bitcast<vec3f>(a.xyz), bitcast<vec3f>(b.xyz), hit.t);
-            if {enter}leaf {{
+";
+    let mut s = start;
+    if group.spheres() {
+        // A sphere costs no more than a box: both at every visit, and leaves hold the sphere.
+        for _ in 0..VISITS_A_TRIP {
+            let _ = writeln!(
+                s,
+                "        {{{visit}            let item = b.w;
+            if leaf {{
+                let i = select(0u, (item >> 1u) - 1u, leaf);
 {leaf}
             }}
-            node = select(a.w, node + 1u, {within}met);
+            node = select(a.w, node + 1u, leaf || met);
+        }}"
+            );
+        }
+    } else {
+        // On to the next leaf whose box is met; a masked-off branch would cost its time at every visit.
+        let _ = writeln!(
+            s,
+            "        var item = 0u;
+        while node < {end}u && item == 0u && trips_left > 0u {{
+            trips_left -= 1u;{visit}            item = select(0u, b.w, met);
+            node = select(a.w, node + 1u, met);
+        }}
+        if item != 0u {{
+                let i = (item >> 1u) - 1u;
+{leaf}
         }}"
         );
     }
@@ -221,7 +235,7 @@ fn any(world: &World, k: usize, group: &Group) -> String {
     };
     let leaf = format!(
         "{}                let found = {};
-                hit.key = select(hit.key, found.key, (b.w & 1u) == 1u);",
+                hit.key = select(hit.key, found.key, (item & 1u) == 1u);",
         fetch(group),
         call(group, function, "hit")
     );
