@@ -236,9 +236,8 @@ impl<'a> Row<'a> {
         }
         // The first that is wrong by itself, else the first.
         let wrong = columns.iter().copied().find(|&k| {
-            !self
-                .float(k)
-                .is_some_and(|x| T::from_vector(DVec3::new(x, x, x)).is_some())
+            self.float(k)
+                .is_none_or(|x| T::from_vector(DVec3::new(x, x, x)).is_none())
         });
         let k = wrong.unwrap_or(columns[0]);
         Err((k, self.message::<T>(k)))

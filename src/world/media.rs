@@ -200,7 +200,7 @@ impl Media {
         let side = |g: &Geometry| g.side_of_disk(l.center, l.normal, l.radius);
         let mut cut = false;
         self.index.about(&around(l), |k| {
-            cut |= side(&self.solids[k].geometry) == DiskSide::Cut
+            cut |= side(&self.solids[k].geometry) == DiskSide::Cut;
         });
         (!cut).then(|| self.innermost(&around(l), |g| side(g) == DiskSide::Inside))
     }
