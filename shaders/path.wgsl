@@ -16,6 +16,9 @@ struct Params {
     groups: u32,
     first_group: u32,
     stride: u32,
+    // 1: goes on where the last dispatch could not finish its samples for want of loop trips; and how many there are.
+    resume: u32,
+    trips: u32,
 }
 
 @group(1) @binding(0) var<uniform> params: Params;
@@ -25,6 +28,18 @@ struct Params {
 // For each pixel of the tile: rays; truncated paths, and in the upper half 1 + the place in its block of the first sample
 // that was not finite; how many of those replicates 0 and 1 had, in a half each; and replicates 2 and 3.
 @group(1) @binding(3) var<storage, read_write> counters: array<vec4u>;
+
+#if TREE
+// What is left to a later dispatch for want of loop trips.
+struct Left {
+    // How many pixels have unfinished samples, and 1 + the last of those of which not one sample could be finished.
+    unfinished: atomic<u32>,
+    stuck: atomic<u32>,
+    // For each pixel of the tile: the sample to begin with. Then for each pixel: 1 if it may see a light.
+    next: array<u32>,
+}
+@group(1) @binding(4) var<storage, read_write> left: Left;
+#endif
 
 struct Path {
     ray: Ray,
@@ -75,6 +90,13 @@ fn begin(glances: u32) -> Path {
 // How many camera rays a sample of this pixel sends for what it sees of a light directly. The edge of a light is by far
 // the noisiest thing in most pictures, and a camera ray costs a tenth of a path. Any answer is right; this one holds
 // where the light's disk comes near the pixel, to first order.
+#if TREE
+// Where lights are many the host has looked for them.
+fn glances_at(index: u32) -> u32 {
+    let seen = left.next[params.size.x * params.size.y + index];
+    return select(0u, GLANCES * GLANCES, seen == 1u);
+}
+#else
 fn glances_at(pixel: vec2u) -> u32 {
     let at = vec2f(pixel) + 0.5 - CAMERA_CENTER;
     let w = CAMERA_FORWARD + at.x * CAMERA_DX + at.y * CAMERA_DY;
@@ -99,6 +121,7 @@ fn glances_at(pixel: vec2u) -> u32 {
     }
     return glances;
 }
+#endif
 #endif
 
 // Whether light scattered this often on its way to the eye is kept.
@@ -143,15 +166,33 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var count = counters[index];
 
     var s = params.first;
+#if TREE
+    if params.resume == 1u {
+        s = left.next[index];
+    }
+    let first = s;
+    // A sample that uses up the trips is begun again by the next dispatch: nothing of it is kept.
+    trips_left = params.trips - min(params.trips, TRIPS_AT_START + TRIPS_AT_VERTEX);
+    var before = count;
+    var going = true;
+#endif
 #if SEEN_LIGHTS
+#if TREE
+    let glances = glances_at(index);
+#else
     let glances = glances_at(pixel);
+#endif
 #else
     let glances = 0u;
 #endif
     var path = begin(glances);
     path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances));
     // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
+#if TREE
+    while s < params.end && going {
+#else
     while s < params.end {
+#endif
         var alive = false;
         let hit = intersect(path.ray);
         count.x += 1u;
@@ -174,6 +215,14 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             alive = scatter_at(&path, hit, vec4u(key, s, path.depth, params.seed), &count);
         }
 
+#if TREE
+        trips_left -= min(trips_left, TRIPS_AT_VERTEX);
+        if trips_left == 0u {
+            going = false;
+            count = before;
+            alive = true;
+        }
+#endif
         var glances_left = 0u;
 #if SEEN_LIGHTS
         if glance {
@@ -206,11 +255,21 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             s += 1u;
             path = begin(glances);
             glances_left = glances;
+#if TREE
+            before = count;
+#endif
         }
         if !alive {
             path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances_left));
         }
     }
+#if TREE
+    left.next[index] = s;
+    if s < params.end {
+        atomicAdd(&left.unfinished, 1u);
+        atomicMax(&left.stuck, select(0u, index + 1u, s == first));
+    }
+#endif
     textureStore(running_out, texel, 0, sum_0);
     textureStore(running_out, texel, 1, sum_1);
     textureStore(running_out, texel, 2, sum_2);
@@ -228,8 +287,12 @@ fn emission(path: Path, hit: Hit) -> vec3f {
     if !path.specular {
         let cap = cap_of(light, path.ray.o);
         var pdf = cap_pdf(light, cap, path.ray.d);
+#if LIGHT_TREE
+        pdf *= light_probability(hit.key >> 2u, path.ray.o, path.n);
+#else
 #if SEVERAL_LIGHTS
         pdf *= light_weight(light, path.ray.o, path.n) / fmax(path.weights, TINY);
+#endif
 #endif
         share *= select(0.0, power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * pdf), path.pdf > 0.0);
     }
@@ -289,17 +352,30 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         for (var k = 0u; k < u32(SHADOW_RAYS); k++) {
             var points = u.points.xy;
             var choice = u.choices.x;
+#if LIGHT_TREE
+            var spare = u.choices.w;
+#endif
             if k > 0u {
                 let more = draw(draw_key + vec4u(0u, 0u, k << 20u, 0u));
                 points = more.points.xy;
                 choice = more.choices.x;
+#if LIGHT_TREE
+                spare = more.choices.w;
+#endif
             }
             choice = (choice + f32(k)) * (1.0 / SHADOW_RAYS);
 #else
             let points = u.points.xy;
             let choice = u.choices.x;
+#if LIGHT_TREE
+            let spare = u.choices.w;
 #endif
+#endif
+#if LIGHT_TREE
+            let chosen = choose_light(v.p, n, vec2f(choice, spare));
+#else
             let chosen = choose_light(v.p, n, choice);
+#endif
             weights = chosen.weights;
             let to = sample_cap(chosen.light, chosen.cap, points);
             let cos = dot(n, to.d);

@@ -57,6 +57,43 @@ fn agree(s: &Scene) -> Result<(), Failed> {
     )
 }
 
+/// Hundreds of spheres under hundreds of lights: trees of both, and of what is left when a path ends on a light.
+///
+/// Lights of so small a number must be large, or paths find them too seldom by chance for the second comparison.
+fn many(spheres: usize, lights: usize, size: f64) -> Scene {
+    let mut text = String::from(
+        "[camera]\neye = [0, 1.6, 4.2]\nlook_at = [0, 0.3, 0]\nvfov = 40\nresolution = [48, 36]\n\
+         [material.red]\ntype = 'diffuse'\nreflectance = [0.8, 0.3, 0.2]\n\
+         [material.glass]\ntype = 'dielectric'\n\
+         [material.gloss]\ntype = 'phong'\ndiffuse = [0.2, 0.3, 0.4]\nspecular = [0.5, 0.5, 0.5]\nexponent = 15\n\
+         [[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = 'red'\n\
+         [[plane]]\npoint = [0, 3, 0]\nnormal = [0, 1, 0]\nmaterial = 'red'\n",
+    );
+    // Evenly, by additive recurrence.
+    let spread = |i: usize, k: f64| (i as f64 * k).fract() * 4.0 - 2.0;
+    for i in 0..spheres {
+        let (x, z) = (spread(i, 0.754_877_67), spread(i, 0.569_840_29));
+        let radius = 0.03 + 0.02 * (i as f64).sin();
+        let material = ["red", "gloss", "red", "gloss", "glass"][i % 5];
+        text += &format!(
+            "[[sphere]]\ncenter = [{x}, {radius}, {z}]\nradius = {radius}\nmaterial = '{material}'\n"
+        );
+    }
+    for i in 0..lights {
+        let (x, z) = (spread(i, 0.569_840_29), spread(i, 0.754_877_67));
+        let (y, a) = (1.8 + 0.6 * (i as f64).sin(), i as f64);
+        // Every way but up, of all strengths.
+        let (nx, nz) = ((3.0 * a).sin(), (5.0 * a).cos());
+        let strength = 0.4 / (lights as f64 * size * size) * (2.0 * a).sin().exp();
+        text += &format!(
+            "[[light]]\ncenter = [{x}, {y}, {z}]\nnormal = [{nx}, -1, {nz}]\nradius = {size}\n\
+             radiance = [{strength}, {}, {strength}]\n",
+            strength * 0.7
+        );
+    }
+    scene(&text)
+}
+
 /// Baked values and buffers are two texts of one estimator.
 fn access_agrees(s: &Scene) -> Result<(), Failed> {
     let baked = gpu_runs(s, 64, Some(Access::Baked), 0);
@@ -93,6 +130,12 @@ fn main() {
             agree(&scene(text))
         }));
     }
+    trials.push(Trial::test("many_spheres::agrees", || {
+        agree(&many(300, 3, 0.8))
+    }));
+    trials.push(Trial::test("many_lights::agrees", || {
+        agree(&many(20, 200, 0.1))
+    }));
     libtest_mimic::run(&args, trials).exit();
 }
 

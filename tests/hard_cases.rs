@@ -1,6 +1,8 @@
-//! The hard cases of `etendue selftest`, one test for each of them on the GPU adapter and on the CPU reference.
+//! The hard cases of `etendue selftest`, one test for each of them on the GPU adapter, there with all that
+//! can be in trees too, and on the CPU reference.
 
 use etendue::gpu::{Choice, Gpu};
+use etendue::kernel::Access;
 use etendue::selftest::{Backend, Case, cases};
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::sync::Arc;
@@ -21,10 +23,15 @@ fn run(case: Case, backend: &Backend) -> Result<(), Failed> {
     Err(format!("{}\n{}\non {name} ({driver})", case.what, wrong.join("\n")).into())
 }
 
-fn on_gpu(case: Case) -> Result<(), Failed> {
+/// `access`: with kernels of that kind, instead of those that users get.
+fn on_gpu(case: Case, access: Option<Access>) -> Result<(), Failed> {
     let gpu = Gpu::open(&Choice::default())
         .map_err(|e| format!("no GPU: {e}\ninstall a Vulkan driver (scripts/test does)"))?;
-    run(case, &Backend::gpu(gpu, Arc::new(AtomicBool::new(false))))
+    let backend = Backend::gpu(gpu, Arc::new(AtomicBool::new(false)));
+    match access {
+        Some(access) => run(case, &backend.with_access(access)),
+        None => run(case, &backend),
+    }
 }
 
 fn on_cpu(case: Case) -> Result<(), Failed> {
@@ -41,7 +48,10 @@ fn main() {
     let mut trials = Vec::new();
     for case in cases() {
         trials.push(Trial::test(format!("gpu::{}", case.id()), move || {
-            on_gpu(case)
+            on_gpu(case, None)
+        }));
+        trials.push(Trial::test(format!("tree::{}", case.id()), move || {
+            on_gpu(case, Some(Access::Tree))
         }));
         trials.push(Trial::test(format!("cpu::{}", case.id()), move || {
             on_cpu(case)

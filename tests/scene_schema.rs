@@ -1,7 +1,9 @@
 //! The JSON Schema of scene files against the parser: what it accepts and what it rejects.
 
+use etendue::scene::hash::scene_hash;
 use etendue::scene::parse::parse_str;
 use etendue::scene::schema::schema;
+use etendue::settings::{Overrides, Settings};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -142,6 +144,10 @@ fn valid(schema: &Value, value: &Value) -> bool {
                 let schemas = rule.as_array().expect("a list");
                 schemas.iter().any(|s| valid(s, value))
             }
+            "allOf" => {
+                let schemas = rule.as_array().expect("a list");
+                schemas.iter().all(|s| valid(s, value))
+            }
             other => panic!("unknown keyword {other}"),
         })
 }
@@ -212,6 +218,45 @@ fn whole_tables_are_required() {
     ] {
         assert!(!valid(&schema(), &to_json(&text)), "{text}");
         assert!(parse_str(Path::new("x.toml"), &text).is_err(), "{text}");
+    }
+}
+
+#[test]
+fn rows_of_spheres_and_lights_stand_for_tables() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    };
+    write("points.csv", "x,y,z,radius\n0,0,0,1\n");
+    write(
+        "lamps.csv",
+        "x,y,z,nx,ny,nz,radius,r,g,b\n0,4,0,0,-1,0,0.5,9,9,9\n",
+    );
+    let (head, _) = SMALL.split_at(SMALL.find("[[sphere]]").expect("a sphere"));
+    let text = format!(
+        "{head}[[spheres]]\nfile = 'points.csv'\nmaterial = 'white'\n[[lights]]\nfile = 'lamps.csv'\n"
+    );
+    let place = folder.path().join("x.toml");
+    let rows = parse_str(&place, &text).expect("a scene");
+    assert!(valid(&schema(), &to_json(&text)));
+    // The same in tables is the same scene.
+    let tables = parse_str(&place, SMALL).expect("a scene");
+    let hash = |s| scene_hash(s, &Settings::resolve(s, &Overrides::default()));
+    assert_eq!(hash(&rows), hash(&tables));
+
+    for (old, new, fault) in [
+        ("file = 'points.csv'\n", "", "[[spheres]] lacks file"),
+        ("points.csv", "no.csv", "cannot read"),
+        ("'white'", "'wite'", "did you mean \"white\"?"),
+        (
+            "material = 'white'\n",
+            "",
+            "points.csv:1: no column material",
+        ),
+    ] {
+        let text = text.replacen(old, new, 1);
+        let errors = parse_str(&place, &text).expect_err(new);
+        assert!(errors[0].to_string().contains(fault), "{}", errors[0]);
     }
 }
 

@@ -92,7 +92,7 @@ fn every_combination_of_primitives_and_materials_is_valid() {
             let scene = scene(&text);
             let settings = Settings::resolve(&scene, &Overrides::default());
             let world = World::new(&scene, settings.size);
-            for access in [Access::Baked, Access::Buffers] {
+            for access in [Access::Baked, Access::Buffers, Access::Tree] {
                 validate(
                     &compose(&world, &settings, Some(access)).wgsl,
                     &format!("{access:?}\n{text}"),
@@ -127,7 +127,7 @@ fn every_mode_is_valid() {
                         };
                         let settings = Settings::resolve(scene, &flags);
                         let world = World::new(scene, settings.size);
-                        for access in [Access::Baked, Access::Buffers] {
+                        for access in [Access::Baked, Access::Buffers, Access::Tree] {
                             validate(
                                 &compose(&world, &settings, Some(access)).wgsl,
                                 &format!("{access:?} {flags:?}"),

@@ -45,6 +45,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Render every scene of a folder and compare it with its golden picture
     Regress(RegressArgs),
+    /// Write a scene of many spheres or many lights
+    MakeScene(MakeSceneArgs),
     /// List the adapters, which one would be taken, and why not the others
     Adapters,
     /// Print the JSON Schema of scene files
@@ -64,6 +66,37 @@ pub struct Talk {
     /// Threads of the CPU reference and of work on films; default one for each core
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=4096))]
     pub threads: Option<u16>,
+}
+
+/// `etendue make-scene`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  etendue make-scene spheres --count 1000
+      spheres.toml, with the spheres in spheres.csv
+  etendue make-scene lights --count 100 -o hall.toml")]
+pub struct MakeSceneArgs {
+    /// What there are many of
+    #[arg(value_enum)]
+    pub kind: SceneKind,
+    /// How many
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=5_000_000))]
+    pub count: u32,
+    /// Another one of the same kind
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub seed: u32,
+    /// The scene file [default: spheres.toml or lights.toml]; rows go beside it, with the ending .csv
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub output: Option<PathBuf>,
+}
+
+/// What `etendue make-scene` makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SceneKind {
+    /// Spheres on a floor, in the order of a sunflower's seeds.
+    Spheres,
+    /// Lamps in a hall of columns.
+    Lights,
 }
 
 /// `--progress`.

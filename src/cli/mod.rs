@@ -7,6 +7,7 @@ mod check;
 mod compare;
 mod develop;
 mod failure;
+mod make_scene;
 mod memory;
 mod merge;
 mod plan;
@@ -57,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::Selftest(args) => selftest::selftest(&args),
         Command::Compare(args) => compare::compare(&args),
         Command::Regress(args) => regress::regress(&args),
+        Command::MakeScene(args) => make_scene::make_scene(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
     };

@@ -2,6 +2,7 @@
 
 use super::adapters::WORKGROUP;
 use super::pack::{Params, pack};
+use super::seen::SeenLights;
 use super::tile::{self, Tile};
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
@@ -18,8 +19,8 @@ use std::time::Instant;
 /// A submission aims to take this long: short for watchdogs and progress, long beside its overhead.
 const SUBMISSION_SECONDS: f64 = 0.1;
 
-/// Workgroups of the first submission, when nothing has been measured: enough to keep any adapter busy.
-const FIRST_GROUPS: u32 = 512;
+/// Paths of the first submission, when nothing has been measured: enough to keep any adapter busy.
+const FIRST_PATHS: f64 = 32768.0;
 
 /// The engine that runs a scene's kernel on a Vulkan adapter.
 pub struct GpuEngine {
@@ -30,6 +31,8 @@ pub struct GpuEngine {
     film_layout: wgpu::BindGroupLayout,
     params: wgpu::Buffer,
     tile: Option<Tile>,
+    /// Where lights are seen, if the kernel asks the host.
+    seen: Option<SeenLights>,
     /// What the tile's textures hold since the last call, as it was read back.
     held: Option<Held>,
     seed: u32,
@@ -114,22 +117,19 @@ impl GpuEngine {
                 kernel.trips_per_sample, settings.max_depth
             )));
         }
-        let packed = pack(world);
+        let packed = pack(world, kernel.access);
         let device = &gpu.device;
         let limit = device.limits().max_storage_buffer_binding_size;
-        let bytes = size_of_val(&packed.surfaces[..]) as u64;
-        if bytes > limit {
-            return Err(unable(format!(
-                "{} surfaces need a storage buffer of {bytes} bytes, it binds {limit} at most",
-                packed.surfaces.len()
-            )));
+        if let Some(problem) = scene::too_large(&packed, limit) {
+            return Err(unable(problem));
         }
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let oom = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         // SAFETY: without runtime checks the kernel must not index out of bounds or loop for ever. All its
         // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
         // length, or pixels that it compares with the tile's size first; its loops run over constant
-        // ranges, or over samples, each at most max_depth vertices and some glances long.
+        // ranges, over samples, each at most max_depth vertices and some glances long, or along nodes whose
+        // next ones always have higher numbers.
         let module = unsafe {
             device.create_shader_module_trusted(
                 wgpu::ShaderModuleDescriptor {
@@ -168,6 +168,7 @@ impl GpuEngine {
         if let Some(error) = errors.into_iter().flatten().next() {
             return Err(unable(format!("the kernel was refused: {error}")));
         }
+        let counts_trips = kernel.access == Access::Tree;
         let mut engine = Self {
             kernel,
             pipeline,
@@ -175,6 +176,7 @@ impl GpuEngine {
             film_layout,
             params,
             tile: None,
+            seen: counts_trips.then(|| SeenLights::new(world, settings.size)),
             held: None,
             seed: settings.seed,
             seconds_per_path: None,
@@ -213,7 +215,7 @@ impl GpuEngine {
             y1: 1,
         };
         self.prepare_tile(rect)?;
-        self.submit(rect, 0..0, 0..1, None)?;
+        self.dispatch(rect, 0..0, 0..1, None, false)?;
         self.tile = None;
         Ok(())
     }
@@ -231,7 +233,8 @@ impl GpuEngine {
                 .gpu
                 .device
                 .push_error_scope(wgpu::ErrorFilter::Validation);
-            let tile = Tile::new(&self.gpu, &self.film_layout, &self.params, size);
+            let counts = self.counts_trips();
+            let tile = Tile::new(&self.gpu, &self.film_layout, &self.params, size, counts);
             let invalid = pollster::block_on(invalid.pop());
             // What failed for want of memory is invalid where it is used: the first cause is told.
             if let Some(e) = pollster::block_on(oom.pop()).or(invalid) {
@@ -245,14 +248,52 @@ impl GpuEngine {
         Ok(())
     }
 
-    /// Dispatches `samples` of the pixels of some of the workgroups of `rect`, and waits. `place` says which texture holds
-    /// the running sums (`None`: they start at zero); the new ones go to the other.
+    /// Whether the kernel counts its loop trips and leaves what it cannot finish.
+    fn counts_trips(&self) -> bool {
+        self.kernel.access == Access::Tree
+    }
+
+    /// Dispatches `samples` of the pixels of some of the workgroups of `rect` until all are done. `place` says which
+    /// texture holds the running sums (`None`: they start at zero); the new ones are in the other in the end.
     fn submit(
         &self,
         rect: Rect,
         samples: Range<u64>,
         groups: Range<u32>,
         place: Option<usize>,
+    ) -> Result<(), String> {
+        self.dispatch(rect, samples.clone(), groups.clone(), place, false)?;
+        // Every dispatch reads one texture and writes the other.
+        let mut from = 1 - place.unwrap_or(0);
+        while self.counts_trips() {
+            let [unfinished, stuck] = self.tile.as_ref().ok_or("no tile")?.left(&self.gpu)?;
+            if unfinished == 0 && from == 1 - place.unwrap_or(0) {
+                break;
+            }
+            if stuck > 0 {
+                let (x, y) = ((stuck - 1) % rect.width(), (stuck - 1) / rect.width());
+                return Err(format!(
+                    "one path of pixel {}, {} takes more than {} loop trips, and this driver silently stops an \
+                     invocation at 65535; lower max_depth or use --backend cpu",
+                    rect.x0 + x,
+                    rect.y0 + y,
+                    self.gpu.trip_limit
+                ));
+            }
+            self.dispatch(rect, samples.clone(), groups.clone(), Some(from), true)?;
+            from = 1 - from;
+        }
+        Ok(())
+    }
+
+    /// One dispatch, and waits for it; `resume` goes on with what the last one could not finish.
+    fn dispatch(
+        &self,
+        rect: Rect,
+        samples: Range<u64>,
+        groups: Range<u32>,
+        place: Option<usize>,
+        resume: bool,
     ) -> Result<(), String> {
         let tile = self.tile.as_ref().ok_or("no tile")?;
         let all = workgroups(rect);
@@ -266,6 +307,8 @@ impl GpuEngine {
             groups: all,
             first_group: groups.start,
             stride: coprime_stride(all),
+            resume: u32::from(resume),
+            trips: u32::try_from(self.gpu.trip_limit).unwrap_or(u32::MAX),
             padding: 0,
         };
         self.gpu
@@ -275,6 +318,7 @@ impl GpuEngine {
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        tile.clear_left(&mut encoder);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
@@ -296,7 +340,7 @@ impl GpuEngine {
         place: &mut Option<usize>,
         stop: &AtomicBool,
     ) -> Result<(), EngineError> {
-        let most = (self.gpu.trip_limit / self.kernel.trips_per_sample).max(1);
+        let most = (self.gpu.trip_limit / self.kernel.trips_per_sample.max(1)).max(1);
         let all = workgroups(rect);
         let mut at = samples.start;
         while at < samples.end {
@@ -309,7 +353,7 @@ impl GpuEngine {
                 let paths_per_group = f64::from(WORKGROUP) * (end - at) as f64;
                 let affordable = match self.seconds_per_path {
                     Some(cost) => (SUBMISSION_SECONDS / (cost * paths_per_group)) as u32,
-                    None => FIRST_GROUPS,
+                    None => (FIRST_PATHS / paths_per_group) as u32,
                 };
                 let count = affordable.clamp(1, all - group);
                 let start = Instant::now();
@@ -339,6 +383,9 @@ impl GpuEngine {
             .tile
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
+        if let Some(seen) = &self.seen {
+            tile.upload_seen(&self.gpu, &seen.mark(rect));
+        }
         let mut place = None;
         let held = self.held.take();
         if !samples.start.is_multiple_of(BLOCK) {

@@ -4,7 +4,10 @@ mod adapters;
 mod engine;
 pub mod pack;
 pub mod probe;
+#[cfg(test)]
+mod same_hits;
 mod scene;
+mod seen;
 mod tile;
 
 pub use adapters::{AdapterReport, Choice, Gpu, adapters};

@@ -1,8 +1,9 @@
 //! Host twins of the kernel's structs, and the scene packed into them.
 
-use crate::kernel::{material_tag, shape_tag};
+use crate::kernel::lights::{self, LightTree};
+use crate::kernel::{Access, material_tag, shape_tag, trees};
 use crate::scene::Bsdf;
-use crate::world::{Geometry, World};
+use crate::world::{Geometry, Tree, World};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -44,6 +45,16 @@ pub struct DiskLight {
     face: u32,
 }
 
+/// `LightCluster` of light_tree.wgsl.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, Default)]
+#[repr(C)]
+pub struct LightCluster {
+    center: [f32; 3],
+    radius: f32,
+    power: [f32; 3],
+    cos_cone: f32,
+}
+
 /// `Params` of path.wgsl.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable, Default)]
 #[repr(C)]
@@ -66,6 +77,10 @@ pub struct Params {
     pub first_group: u32,
     /// Stride through them, coprime to their number.
     pub stride: u32,
+    /// 1: goes on where the last dispatch could not finish.
+    pub resume: u32,
+    /// Loop trips that an invocation may take.
+    pub trips: u32,
     /// Fills the struct to its alignment.
     pub padding: u32,
 }
@@ -79,14 +94,70 @@ pub struct Packed {
     pub materials: Vec<Material>,
     /// In the world's order.
     pub lights: Vec<DiskLight>,
+    /// The trees of a kernel that walks them, as tree.wgsl says.
+    pub nodes: Vec<[u32; 4]>,
+    /// The clusters of a kernel that chooses lights by them.
+    pub clusters: Vec<LightCluster>,
+    /// The lights in their order.
+    pub places: Vec<u32>,
 }
 
 fn f(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
-/// Packs a world.
-pub fn pack(world: &World) -> Packed {
+/// The trees of [`Access::Tree`], one after the other, as tree.wgsl says.
+fn pack_trees(world: &World, surfaces: &[Surface]) -> Vec<[u32; 4]> {
+    let corner = |x: [f32; 3], last: u32| {
+        let [x, y, z] = x.map(f32::to_bits);
+        [x, y, z, last]
+    };
+    let blocks = trees::blockers(world);
+    let mut nodes: Vec<[u32; 4]> = Vec::new();
+    for group in &trees::Parted::new(world).groups {
+        debug_assert_eq!(nodes.len(), 2 * group.header);
+        let tree = Tree::new(&trees::boxes(world, group));
+        let first = group.header as u32 + 1;
+        let reach = tree.nodes.first().map_or(0.0, |root| {
+            root.min.iter().chain(&root.max).map(|x| x.abs()).sum()
+        });
+        nodes.extend([corner([reach, 0.0, 0.0], 0), [0; 4]]);
+        for n in &tree.nodes {
+            let escape = first + n.escape;
+            let Some(item) = n.item else {
+                nodes.extend([corner(n.min, escape), corner(n.max, 0)]);
+                continue;
+            };
+            let number = group.numbers[item as usize];
+            let word = 2 * (number as u32 + 1) + u32::from(blocks[number]);
+            if group.spheres() {
+                let s = &surfaces[number];
+                nodes.push(corner(s.point, escape));
+                nodes.push([s.radius.to_bits(), s.solid, s.parent, word]);
+            } else {
+                nodes.extend([corner(n.min, escape), corner(n.max, word)]);
+            }
+        }
+        let end = group.end() as u32;
+        nodes.extend([corner([2e30; 3], end), corner([-2e30; 3], 0)]);
+    }
+    nodes
+}
+
+/// The light clusters of a world, and the lights in their order.
+fn pack_lights(world: &World) -> (Vec<LightCluster>, Vec<u32>) {
+    let tree = LightTree::new(world);
+    let cluster = |c: &lights::Cluster| LightCluster {
+        center: f(c.center),
+        radius: c.radius as f32,
+        power: f(c.power),
+        cos_cone: c.cos_cone as f32,
+    };
+    (tree.clusters.iter().map(cluster).collect(), tree.places)
+}
+
+/// Packs a world for kernels of this kind.
+pub fn pack(world: &World, access: Access) -> Packed {
     let mut surfaces = Vec::with_capacity(world.lights.len() + world.primitives.len());
     for l in &world.lights {
         surfaces.push(Surface {
@@ -175,6 +246,18 @@ pub fn pack(world: &World) -> Packed {
             face: l.face,
         })
         .collect();
+    let (mut nodes, mut clusters, mut places) = Default::default();
+    if access == Access::Tree {
+        nodes = pack_trees(world, &surfaces);
+        (clusters, places) = pack_lights(world);
+    }
+    if nodes.is_empty() {
+        nodes.push([0; 4]);
+    }
+    if clusters.is_empty() {
+        clusters.push(LightCluster::default());
+        places.push(0);
+    }
     if surfaces.is_empty() {
         surfaces.push(Surface::default());
     }
@@ -188,6 +271,9 @@ pub fn pack(world: &World) -> Packed {
         surfaces,
         materials,
         lights,
+        nodes,
+        clusters,
+        places,
     }
 }
 
@@ -210,7 +296,8 @@ mod tests {
             Surface { point, radius, axis, offset, faces, material, top, solid, parent, shape }
             Material { color, kind, specular, exponent }
             DiskLight { center, radius, normal, offset, radiance, face }
-            Params { tile, size, first, end, fresh, seed, groups, first_group, stride }
+            LightCluster { center, radius, power, cos_cone }
+            Params { tile, size, first, end, fresh, seed, groups, first_group, stride, resume, trips }
         };
         // Struct declarations are all that is needed, wherever they stand.
         let mut text = String::new();

@@ -3,7 +3,7 @@
 use super::adapters::WORKGROUP;
 use super::pack::pack;
 use super::{Gpu, scene};
-use crate::kernel::probe_source;
+use crate::kernel::{Access, probe_source};
 use crate::world::World;
 use wgpu::util::DeviceExt as _;
 
@@ -24,34 +24,34 @@ pub fn run(
     body: &str,
     inputs: &[Values],
 ) -> Result<Vec<Values>, String> {
-    Probe::compile(gpu, &probe_source(features, body), false)?.run(gpu, None, inputs)
+    Probe::compile(gpu, &probe_source(features, body), None)?.run(gpu, None, inputs)
 }
 
 /// A compiled probe.
 pub struct Probe {
     pipeline: wgpu::ComputePipeline,
-    /// Layout of a scene's buffers, if it reads any.
-    scene: Option<wgpu::BindGroupLayout>,
+    /// Layout of a scene's buffers, if it reads any, and how.
+    scene: Option<(wgpu::BindGroupLayout, Access)>,
     values: wgpu::BindGroupLayout,
 }
 
 impl Probe {
-    /// Compiles `source`; `with_scene` if it reads a scene's buffers.
+    /// Compiles `source`, which reads a scene's buffers if it was composed for such an access.
     ///
     /// # Errors
     /// When the module is refused.
-    pub fn compile(gpu: &Gpu, source: &str, with_scene: bool) -> Result<Self, String> {
+    pub fn compile(gpu: &Gpu, source: &str, access: Option<Access>) -> Result<Self, String> {
         let device = &gpu.device;
         let invalid = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("probe"),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let scene = with_scene.then(|| scene::layout(device));
+        let scene = access.map(|access| (scene::layout(device), access));
         let values = values_layout(device);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("probe"),
-            bind_group_layouts: &[scene.as_ref(), Some(&values)],
+            bind_group_layouts: &[scene.as_ref().map(|s| &s.0), Some(&values)],
             immediate_size: 0,
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -110,7 +110,7 @@ impl Probe {
             }),
         });
         let scene = (self.scene.as_ref().zip(world))
-            .map(|(layout, world)| scene::bind(device, layout, &pack(world)));
+            .map(|((layout, access), world)| scene::bind(device, layout, &pack(world, *access)));
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());

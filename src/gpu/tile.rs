@@ -14,8 +14,13 @@ pub(super) struct Tile {
     /// Bind group k reads texture k.
     pub bind_groups: [wgpu::BindGroup; 2],
     counters: wgpu::Buffer,
+    /// What dispatches leave to later ones, where kernels count their loop trips.
+    left: wgpu::Buffer,
     staging: wgpu::Buffer,
 }
+
+/// Bytes of the two numbers that say what is left.
+const LEFT_HEAD: u64 = 8;
 
 fn row_bytes(width: u32) -> u32 {
     (width * TEXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
@@ -37,6 +42,7 @@ impl Tile {
         layout: &wgpu::BindGroupLayout,
         params: &wgpu::Buffer,
         size: [u32; 2],
+        counts_trips: bool,
     ) -> Self {
         let texture = || {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -58,6 +64,16 @@ impl Tile {
         let counters = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("counters"),
             size: counter_bytes,
+            usage: wgpu::BufferUsages::STORAGE
+                | wgpu::BufferUsages::COPY_SRC
+                | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let nexts = if counts_trips { 2 * pixels } else { 1 };
+        let left = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("left"),
+            size: LEFT_HEAD + 4 * nexts,
             usage: wgpu::BufferUsages::STORAGE
                 | wgpu::BufferUsages::COPY_SRC
                 | wgpu::BufferUsages::COPY_DST,
@@ -96,6 +112,10 @@ impl Tile {
                         binding: 3,
                         resource: counters.as_entire_binding(),
                     },
+                    wgpu::BindGroupEntry {
+                        binding: 4,
+                        resource: left.as_entire_binding(),
+                    },
                 ],
             })
         };
@@ -105,8 +125,40 @@ impl Tile {
             textures,
             bind_groups,
             counters,
+            left,
             staging,
         }
+    }
+
+    /// Says which pixels, rows of the tile, may see a light.
+    pub fn upload_seen(&self, gpu: &Gpu, seen: &[u32]) {
+        let at = LEFT_HEAD + 4 * seen.len() as u64;
+        gpu.queue
+            .write_buffer(&self.left, at, bytemuck::cast_slice(seen));
+    }
+
+    /// Nothing is left, before a dispatch.
+    pub fn clear_left(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.clear_buffer(&self.left, 0, Some(LEFT_HEAD));
+    }
+
+    /// How many pixels have samples left to do, and 1 + the number of one of which not even one could be finished.
+    pub fn left(&self, gpu: &Gpu) -> Result<[u32; 2], String> {
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&self.left, 0, &self.staging, 0, LEFT_HEAD);
+        gpu.queue.submit([encoder.finish()]);
+        let head = self.staging.slice(..LEFT_HEAD);
+        head.map_async(wgpu::MapMode::Read, |_| {});
+        gpu.wait()?;
+        let mapped = head
+            .get_mapped_range()
+            .map_err(|e| format!("reading back failed: {e}"))?;
+        let left = bytemuck::pod_read_unaligned(&mapped);
+        drop(mapped);
+        self.staging.unmap();
+        Ok(left)
     }
 
     /// Counters to zero.
@@ -222,7 +274,7 @@ fn extent(size: [u32; 2], layers: u32) -> wgpu::Extent3d {
     }
 }
 
-/// Group 1 of the kernel: parameters, running sums in and out, counters.
+/// Group 1 of the kernel: parameters, running sums in and out, counters, what is left.
 pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
         binding,
@@ -259,6 +311,14 @@ pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
             ),
             entry(
                 3,
+                wgpu::BindingType::Buffer {
+                    ty: wgpu::BufferBindingType::Storage { read_only: false },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+            ),
+            entry(
+                4,
                 wgpu::BindingType::Buffer {
                     ty: wgpu::BufferBindingType::Storage { read_only: false },
                     has_dynamic_offset: false,

@@ -1,12 +1,14 @@
 //! The kernel made for one scene: the modules of `shaders/` that it needs, constants, and the generated
 //! functions that meet its primitives and choose its lights.
 
+pub(crate) mod lights;
 mod literal;
 mod near;
 mod preprocess;
 mod rays;
 mod select;
 mod tables;
+pub(crate) mod trees;
 
 pub use select::{Access, BAKED_LIMIT};
 
@@ -70,7 +72,7 @@ pub(crate) fn shape_tag(geometry: &Geometry) -> u32 {
 }
 
 /// The modules of `shaders/`, in the order in which they are read.
-pub const MODULES: [(&str, &str); 15] = [
+pub const MODULES: [(&str, &str); 17] = [
     ("ray", include_str!("../../shaders/ray.wgsl")),
     ("frame", include_str!("../../shaders/frame.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
@@ -89,6 +91,8 @@ pub const MODULES: [(&str, &str); 15] = [
     ("dielectric", include_str!("../../shaders/dielectric.wgsl")),
     ("phong", include_str!("../../shaders/phong.wgsl")),
     ("surface", include_str!("../../shaders/surface.wgsl")),
+    ("tree", include_str!("../../shaders/tree.wgsl")),
+    ("light_tree", include_str!("../../shaders/light_tree.wgsl")),
 ];
 
 /// The entry point and the path loop.
@@ -101,14 +105,15 @@ pub struct Kernel {
     pub wgsl: String,
     /// How it reaches the scene's values.
     pub access: Access,
-    /// The most loop trips that one sample can take of an invocation.
+    /// The most loop trips that one sample can take of an invocation; 0 where the kernel counts them itself, and leaves
+    /// what it cannot finish to the next dispatch.
     pub trips_per_sample: u64,
 }
 
 /// Composes the kernel of `world` under `settings`; `access` overrides the rule of [`Access::choose`].
 pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Kernel {
     let access = access.unwrap_or_else(|| Access::choose(world));
-    let features = features(world, settings);
+    let features = features(world, settings, access);
     let mut wgsl = String::from("// Made for one scene by etendue.\n\n");
     wgsl.push_str(&scene_text(world, settings, access, &features));
     let _ = write!(
@@ -116,10 +121,31 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
         "\n// ---- path.wgsl\n\n{}",
         preprocess::run(PATH, &features)
     );
+    let trips_per_sample = match access {
+        Access::Tree => 0,
+        Access::Baked | Access::Buffers => {
+            u64::from(last_depth(settings)).saturating_mul(trips_at_vertex(world, settings, access))
+                + trips_at_start(world, access, &features)
+        }
+    };
+    Kernel {
+        wgsl,
+        access,
+        trips_per_sample,
+    }
+}
+
+/// The loop trips that a vertex can take of an invocation; but for walks through trees, which count theirs.
+fn trips_at_vertex(world: &World, settings: &Settings, access: Access) -> u64 {
     // Loops over all surfaces for a ray, and over all lights to choose one.
     let (ray, choice) = match access {
         Access::Baked => (0, 0),
         Access::Buffers => (surfaces(world), world.lights.len() as u64),
+        // Surfaces without bounds, if they are many.
+        Access::Tree => (
+            trees::Parted::new(world).apart.len() as u64,
+            2 * lights::trips(world),
+        ),
     };
     // Every vertex: nearest hit, and for each shadow ray a choice and a ray.
     let inner = ray + u64::from(settings.shadow_rays) * (choice + ray);
@@ -128,24 +154,25 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     } else {
         0
     };
-    let strata_loop = 32;
     let hidden = if rays::lights_overlap(world) {
         u64::from(settings.shadow_rays) * world.lights.len() as u64
     } else {
         0
     };
-    let glances = if features.contains("SEEN_LIGHTS") {
-        u64::from(GLANCES * GLANCES) * (1 + ray)
-    } else {
-        0
+    1 + inner + shadow_loop + hidden
+}
+
+/// The loop trips before the first vertex of a sample, and those of its glances.
+fn trips_at_start(world: &World, access: Access, features: &BTreeSet<&str>) -> u64 {
+    let strata_loop = 32;
+    let ray = match access {
+        Access::Buffers => surfaces(world),
+        Access::Baked | Access::Tree => 0,
     };
-    let trips_per_sample = u64::from(last_depth(settings))
-        .saturating_mul(1 + inner + shadow_loop + hidden)
-        .saturating_add(glances + strata_loop);
-    Kernel {
-        wgsl,
-        access,
-        trips_per_sample,
+    if features.contains("SEEN_LIGHTS") {
+        u64::from(GLANCES * GLANCES) * (1 + ray) + strata_loop
+    } else {
+        strata_loop
     }
 }
 
@@ -159,6 +186,14 @@ fn scene_text(
     let mut s = String::new();
     tags(&mut s);
     s.push_str(&constants(world, settings));
+    if access == Access::Tree {
+        let vertex = trips_at_vertex(world, settings, access);
+        let start = trips_at_start(world, access, features);
+        let _ = writeln!(
+            s,
+            "const TRIPS_AT_VERTEX: u32 = {vertex}u;\nconst TRIPS_AT_START: u32 = {start}u;"
+        );
+    }
     for (name, text) in MODULES {
         if needs(name, features) {
             let _ = write!(
@@ -180,7 +215,7 @@ pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
     let mut s = String::new();
     tags(&mut s);
     for (name, text) in MODULES {
-        if name != "camera" && name != "surface" {
+        if !["camera", "surface", "tree", "light_tree"].contains(&name) {
             s.push_str(&preprocess::run(text, &features));
         }
     }
@@ -195,7 +230,7 @@ pub(crate) fn scene_probe_source(
     access: Access,
     body: &str,
 ) -> String {
-    let mut s = scene_text(world, settings, access, &features(world, settings));
+    let mut s = scene_text(world, settings, access, &features(world, settings, access));
     s.push_str(&probe_entry(body));
     s
 }
@@ -247,7 +282,7 @@ fn needed_depth(settings: &Settings) -> u32 {
 }
 
 /// Names that are true for this scene, for `#if` in the modules and for [`needs`].
-fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
+fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'static str> {
     let mut f = BTreeSet::new();
     let mut set = |name, on: bool| {
         if on {
@@ -288,6 +323,11 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     let depth = last_depth(settings);
     let sampling = depth > 1 && !world.lights.is_empty() && (diffuse || phong);
     set("LIGHT_SAMPLING", sampling);
+    set("TREE", access == Access::Tree);
+    set(
+        "LIGHT_TREE",
+        sampling && access == Access::Tree && world.lights.len() > lights::MOST_LOOKED_AT,
+    );
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
     set(
         "EXTREME_LIGHTS",
@@ -307,7 +347,7 @@ fn features(world: &World, settings: &Settings) -> BTreeSet<&'static str> {
     set(
         "SEEN_LIGHTS",
         settings.light.emitted
-            && surfaces(world) <= MOST_GLANCED_AT
+            && (access == Access::Tree || surfaces(world) <= MOST_GLANCED_AT)
             && world.lights.iter().any(faces_eye),
     );
     set("WHITTED", settings.integrator == Integrator::Whitted);
@@ -336,6 +376,8 @@ fn needs(name: &str, features: &BTreeSet<&str>) -> bool {
         "mirror" => has("MIRROR") || has("DIELECTRIC") || has("PHONG"),
         "dielectric" => has("DIELECTRIC"),
         "phong" => has("PHONG"),
+        "tree" => has("TREE"),
+        "light_tree" => has("LIGHT_TREE"),
         _ => true,
     }
 }

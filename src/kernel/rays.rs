@@ -1,37 +1,59 @@
 //! Generated WGSL: `intersect`, `occluded`, `choose_light` and `light_at` of one scene.
 
 use super::literal::{float, vector};
-use super::{Access, tables};
-use crate::world::{COINCIDENT, Geometry, Side, World, WorldLight, WorldPrimitive};
+use super::trees::{self, Parted};
+use super::{Access, lights, select::BAKED_LIMIT, tables};
+use crate::world::{Bounds, COINCIDENT, Geometry, Side, Tree, World, WorldLight, WorldPrimitive};
 use glam::DVec3;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>) -> String {
     let mut s = String::new();
+    let shadows = features.contains("LIGHT_SAMPLING");
+    let everything: Vec<Surface> = surfaces(world);
+    // With trees the surfaces outside them are met as those of small scenes, if they are no more.
+    let parted = (access == Access::Tree).then(|| Parted::new(world));
+    let (mut one_by_one, each) = match &parted {
+        Some(parted) if parted.apart.len() <= BAKED_LIMIT => (parted.apart.clone(), Access::Baked),
+        Some(parted) => (parted.apart.clone(), Access::Buffers),
+        None => (everything, access),
+    };
+    if let Some(parted) = &parted {
+        s.push_str(&trees::walks(world, parted, shadows));
+    }
     s.push_str(
         "// The nearest surface that the ray meets; coincident ones in the order of the format.\n",
     );
     s.push_str("fn intersect(ray: Ray) -> Hit {\n    var hit = Hit(FAR, NONE);\n");
-    let everything: Vec<Surface> = surfaces(world);
-    calls(&mut s, world, &everything, access, true);
+    calls(&mut s, world, &one_by_one, each, true);
+    if let Some(parted) = &parted {
+        trees::calls(&mut s, parted, "nearest");
+    }
     s.push_str("    return hit;\n}\n");
-    if features.contains("LIGHT_SAMPLING") {
+    if shadows {
         s.push_str("\n// Whether anything lies within `distance` of the ray's origin. What cannot come between two points\n");
         s.push_str("// of the room, as its own walls, is not asked.\nfn occluded(ray: Ray, distance: f32, light: u32) -> bool {\n");
         s.push_str("    var hit = Hit(distance, NONE);\n");
-        let mut blockers = everything;
         let hull = hull_faces(world);
-        blockers.retain(|b| can_block(world, b, &hull));
-        for b in &mut blockers {
+        one_by_one.retain(|b| can_block(world, b, &hull));
+        for b in &mut one_by_one {
             b.function = shadow_function(world, b);
         }
-        calls(&mut s, world, &blockers, access, false);
+        calls(&mut s, world, &one_by_one, each, false);
+        if let Some(parted) = &parted {
+            trees::calls(&mut s, parted, "any");
+        }
         if lights_overlap(world) {
             s.push_str(HIDDEN);
         }
         s.push_str("    return hit.key != NONE;\n}\n\n");
-        s.push_str(&light_choice(world, access));
+        if features.contains("LIGHT_TREE") {
+            s.push_str(CHOSEN);
+            s.push_str(&lights::constants(world));
+        } else {
+            s.push_str(&light_choice(world, access));
+        }
     }
     s.push('\n');
     s.push_str(&tables::generate(world, access));
@@ -40,14 +62,14 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
 
 /// One thing to meet: a light or a primitive, by its number in the kernel (lights first).
 #[derive(Clone, Copy, PartialEq)]
-struct Surface {
-    number: usize,
-    light: bool,
+pub(super) struct Surface {
+    pub number: usize,
+    pub light: bool,
     /// Function name in WGSL; consecutive surfaces with the same one make one loop.
-    function: &'static str,
+    pub function: &'static str,
 }
 
-fn surfaces(world: &World) -> Vec<Surface> {
+pub(super) fn surfaces(world: &World) -> Vec<Surface> {
     let lights = (0..world.lights.len()).map(|number| Surface {
         number,
         light: true,
@@ -79,7 +101,7 @@ fn function(p: &WorldPrimitive) -> &'static str {
 }
 
 /// The function that answers for a shadow ray, which needs no distance, what `surface.function` answers for others.
-fn shadow_function(world: &World, surface: &Surface) -> &'static str {
+pub(super) fn shadow_function(world: &World, surface: &Surface) -> &'static str {
     let dark = || !primitive(world, surface).holds_light;
     match surface.function {
         "sphere_outside" => "sphere_shadow",
@@ -107,7 +129,7 @@ fn calls(s: &mut String, world: &World, list: &[Surface], access: Access, neares
                 let _ = writeln!(s, "    hit = {};", baked_call(world, surface));
             }
         }
-        Access::Buffers => {
+        Access::Buffers | Access::Tree => {
             for run in list.chunk_by(|a, b| a.function == b.function && a.number + 1 == b.number) {
                 let (begin, end) = (run[0].number, run[run.len() - 1].number + 1);
                 let _ = writeln!(s, "    for (var i = {begin}u; i < {end}u; i++) {{");
@@ -121,7 +143,7 @@ fn calls(s: &mut String, world: &World, list: &[Surface], access: Access, neares
     }
 }
 
-fn primitive(world: &World, s: &Surface) -> WorldPrimitive {
+pub(super) fn primitive(world: &World, s: &Surface) -> WorldPrimitive {
     world.primitives[s.number - world.lights.len()]
 }
 
@@ -249,7 +271,7 @@ fn disk(center: DVec3, radius: f64, normal: DVec3, offset: f64) -> String {
     )
 }
 
-fn buffer_call(function: &str) -> String {
+pub(super) fn buffer_call(function: &str) -> String {
     let (shape, faces) = if function.starts_with("disk") {
         ("Disk(s.point, s.radius, s.axis, s.offset)", "s.faces.x, ")
     } else if function.starts_with("cylinder") {
@@ -274,7 +296,7 @@ fn buffer_call(function: &str) -> String {
 
 /// Faces of the convex hull that holds every light: opaque planes that no light reaches behind. A segment from a point in
 /// front of such a plane to a light never crosses it.
-fn hull_faces(world: &World) -> BTreeSet<u32> {
+pub(super) fn hull_faces(world: &World) -> BTreeSet<u32> {
     let in_front = |normal: DVec3, offset: f64| {
         world.lights.iter().all(|l| {
             let lowest = normal.dot(l.center) - l.radius * normal.cross(l.normal).length();
@@ -296,7 +318,7 @@ fn hull_faces(world: &World) -> BTreeSet<u32> {
 }
 
 /// Whether a surface can lie between a point that a path reaches and a light.
-fn can_block(world: &World, s: &Surface, hull: &BTreeSet<u32>) -> bool {
+pub(super) fn can_block(world: &World, s: &Surface, hull: &BTreeSet<u32>) -> bool {
     if s.light {
         // Flush on the hull it is as much out of the way as the hull; and lights of one plane are never between each
         // other and a point.
@@ -360,15 +382,26 @@ pub(super) fn light_literal(l: &WorldLight) -> String {
 
 /// Whether two lights share a plane and some of it, where the first in the file hides the others.
 pub(super) fn lights_overlap(world: &World) -> bool {
-    let mut by_face: Vec<&WorldLight> = world.lights.iter().collect();
-    by_face.sort_by_key(|l| l.face);
-    by_face.chunk_by(|a, b| a.face == b.face).any(|plane| {
-        plane.iter().enumerate().any(|(i, a)| {
-            plane[..i]
-                .iter()
-                .any(|b| a.center.distance(b.center) < a.radius + b.radius)
+    let boxes: Vec<Bounds> = world
+        .lights
+        .iter()
+        .map(|l| Bounds::disk(l.center, l.normal, l.radius))
+        .collect();
+    let tree = Tree::new(&boxes);
+    world
+        .lights
+        .iter()
+        .zip(&boxes)
+        .enumerate()
+        .any(|(i, (a, around))| {
+            let mut overlap = false;
+            tree.touching(around, |k| {
+                let b = &world.lights[k];
+                overlap |=
+                    k < i && a.face == b.face && a.center.distance(b.center) < a.radius + b.radius;
+            });
+            overlap
         })
-    })
 }
 
 const HIDDEN: &str = "\
@@ -404,8 +437,9 @@ fn light_choice(world: &World, access: Access) -> String {
         s.push_str("    return Chosen(light, 0u, cap_of(light, p), 1.0, 1.0);\n}\n");
         return s;
     }
+    // With trees, lights too few for a tree of their own are chosen as in a small scene.
     match access {
-        Access::Baked => {
+        Access::Baked | Access::Tree => {
             // All weights stay in registers; the first partial sum above u times the whole chooses.
             for (i, l) in world.lights.iter().enumerate() {
                 let _ = writeln!(s, "    let light_{i} = {};", light_literal(l));

@@ -3,17 +3,19 @@
 use crate::engine::DeviceInfo;
 use crate::world::World;
 
-/// Scenes with more surfaces, lights included, are read from storage buffers: unrolled code costs its
-/// compiler about linear time, and past a few dozen surfaces a loop is as fast.
+/// Scenes with more surfaces, lights included, have trees: unrolled code costs its compiler about linear time, and past a
+/// few dozen surfaces a walk through a tree is as fast.
 pub const BAKED_LIMIT: usize = 48;
 
-/// Where the loops over surfaces and lights find their values.
+/// Where the surfaces and lights are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Access {
     /// One line of code a surface, its values in the text.
     Baked,
     /// Loops over storage buffers.
     Buffers,
+    /// Bounding volume hierarchies in storage buffers.
+    Tree,
 }
 
 impl Access {
@@ -22,17 +24,16 @@ impl Access {
         if world.lights.len() + world.primitives.len() <= BAKED_LIMIT {
             Self::Baked
         } else {
-            Self::Buffers
+            Self::Tree
         }
     }
 
     /// The same on a known device. SwiftShader's compiler takes minutes over the long straight code of a dozen baked
     /// surfaces, and a second over the loops.
     pub fn choose_for(world: &World, device: &DeviceInfo) -> Self {
-        if device.name.contains("SwiftShader") {
-            Self::Buffers
-        } else {
-            Self::choose(world)
+        match Self::choose(world) {
+            Self::Baked if device.name.contains("SwiftShader") => Self::Buffers,
+            access => access,
         }
     }
 
@@ -41,6 +42,7 @@ impl Access {
         match self {
             Self::Baked => "baked",
             Self::Buffers => "buffers",
+            Self::Tree => "tree",
         }
     }
 }

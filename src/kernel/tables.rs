@@ -16,15 +16,20 @@ pub(super) fn generate(world: &World, access: Access) -> String {
     fetches(world, access) + &scales.unwrap_or_default()
 }
 
-/// See [`World::light_scales`].
+/// See [`World::light_scales`]. Media that follow each other with one scale make one line.
 fn light_scale(scales: &[f64]) -> String {
     let mut s = format!(
         "\nfn light_scale(medium: u32) -> f32 {{\n    var scale = {};\n",
         float(scales[0])
     );
-    for (medium, x) in scales.iter().enumerate().skip(1) {
-        let x = float(*x);
-        let _ = writeln!(s, "    scale = select(scale, {x}, medium == {medium}u);");
+    let mut first = 1;
+    for run in scales[1..].chunk_by(|a, b| a == b) {
+        let (x, last) = (float(run[0]), first + run.len() - 1);
+        let _ = writeln!(
+            s,
+            "    scale = select(scale, {x}, medium >= {first}u && medium <= {last}u);"
+        );
+        first = last + 1;
     }
     s + "    return scale;\n}\n"
 }
@@ -32,7 +37,7 @@ fn light_scale(scales: &[f64]) -> String {
 fn fetches(world: &World, access: Access) -> String {
     match access {
         Access::Baked => baked(world),
-        Access::Buffers => "\
+        Access::Buffers | Access::Tree => "\
 fn surface_at(key: u32) -> Surface {
     return surfaces[key >> 2u];
 }

@@ -327,6 +327,22 @@ fn cylinder(t: &mut impl Table) -> Option<Shape> {
     })
 }
 
+/// `[[spheres]]`: the file of rows, and the name of their material if they have one in common.
+pub(super) fn spheres(t: &mut impl Table) -> Option<(String, Option<String>)> {
+    let about = "Comma-separated rows under the names of columns, x, y, z, radius and (without the key material) \
+                 material; relative to the scene file.";
+    let file = t.required::<Text>("file", about);
+    let material = t.optional::<Text>("material", None, "NAME of a [material.NAME], for all.");
+    Some((file?.0, material.map(|m| m.0)))
+}
+
+/// `[[lights]]`: the file of rows.
+pub(super) fn lights(t: &mut impl Table) -> Option<String> {
+    let about = "Comma-separated rows under the names of columns, x, y, z, nx, ny, nz, radius, r, g, b (centre, normal, \
+                 radius, radiance); relative to the scene file.";
+    t.required::<Text>("file", about).map(|f| f.0)
+}
+
 /// `[[light]]`, at `line` of the file.
 pub(super) fn light(t: &mut impl Table, line: usize) -> Option<Light> {
     let center = t.required::<Point>("center", "Centre.");

@@ -5,13 +5,16 @@
 
 pub mod check;
 mod format;
+pub mod generate;
 pub mod hash;
 pub(crate) mod order;
 pub mod parse;
+mod rows;
 pub mod schema;
 mod source;
 mod value;
 
+pub use rows::MAX_ROWS_BYTES;
 pub use value::LARGEST_STRATA;
 
 use glam::DVec3;
@@ -31,9 +34,9 @@ pub struct Scene {
     pub render: RenderHints,
     /// Materials in the order of their names.
     pub materials: Vec<Material>,
-    /// Primitives in the order spheres, planes, disks, cylinders, each in file order.
+    /// Primitives in the order spheres (those from files of rows last), planes, disks, cylinders, each in file order.
     pub primitives: Vec<Primitive>,
-    /// Disk lights in file order; at least one.
+    /// Disk lights in file order, those from files of rows last; at least one.
     pub lights: Vec<Light>,
 }
 

@@ -2,6 +2,7 @@
 //! between tables. Every independent error is reported, with its place.
 
 use super::format::{self, Found, MaterialKind, Need, ShapeKind, Table};
+use super::rows;
 use super::schema;
 use super::source::{Faults, Source, quoted, suggestion};
 use super::value::{Text, Value};
@@ -164,7 +165,16 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
     };
     let materials = materials(&mut file);
     let primitives = primitives(&mut file, &materials);
-    let lights: Vec<Option<Light>> = file.each("light", |t, line| format::light(t, line));
+    let mut lights: Vec<Option<Light>> = file.each("light", |t, line| format::light(t, line));
+    for more in file.each("lights", |t, line| {
+        let name = format::lights(t)?;
+        t.rows(&name, |path| rows::lights(path, line))
+    }) {
+        match more {
+            Some(more) => lights.extend(more.into_iter().map(Some)),
+            None => lights.push(None),
+        }
+    }
     if lights.is_empty() && !file.is_wrong("light") {
         file.faults.push(
             None,
@@ -251,6 +261,14 @@ fn primitives(file: &mut Reader, materials: &[(String, Option<Bsdf>)]) -> Vec<Op
                 line,
             })
         }));
+        if kind == ShapeKind::Sphere {
+            for more in file.each("spheres", |t, line| spheres(t, line, materials)) {
+                match more {
+                    Some(more) => primitives.extend(more.into_iter().map(Some)),
+                    None => primitives.push(None),
+                }
+            }
+        }
     }
     let wrong = ShapeKind::ALL.iter().any(|kind| file.is_wrong(kind.name()));
     if primitives.is_empty() && !wrong {
@@ -279,6 +297,28 @@ fn unknown_material(name: &str, materials: &[(String, Option<Bsdf>)]) -> String 
         quoted(name),
         suggestion(name, names())
     )
+}
+
+/// The spheres of a `[[spheres]]`.
+fn spheres(
+    t: &mut Reader,
+    line: usize,
+    materials: &[(String, Option<Bsdf>)],
+) -> Option<Vec<Primitive>> {
+    let (name, material) = format::spheres(t)?;
+    let find = |name: &str| {
+        let found = materials.binary_search_by(|m| m.0.as_str().cmp(name));
+        found.map_err(|_| unknown_material(name, materials))
+    };
+    let common = match material.as_deref().map(find) {
+        Some(Err(message)) => {
+            t.refuse("material", message);
+            return None;
+        }
+        Some(Ok(material)) => Some(material),
+        None => None,
+    };
+    t.rows(&name, |path| rows::spheres(path, line, common, find))
 }
 
 /// A table of the file that is being read.
@@ -340,6 +380,31 @@ impl<'a, 't> Reader<'a, 't> {
             header,
             table,
             known: Vec::new(),
+        }
+    }
+
+    /// What `read` makes of the file of rows `name`, which lies beside the scene file or where `name` leads from there.
+    fn rows<T>(
+        &mut self,
+        name: &str,
+        read: impl FnOnce(&Path) -> Result<Vec<T>, rows::Wrong>,
+    ) -> Option<Vec<T>> {
+        let path = self
+            .source
+            .path()
+            .parent()
+            .unwrap_or(Path::new(""))
+            .join(name);
+        match read(&path) {
+            Ok(rows) => Some(rows),
+            Err(rows::Wrong::File(message)) => {
+                self.refuse("file", format!("cannot read {}: {message}", path.display()));
+                None
+            }
+            Err(rows::Wrong::Content(errors)) => {
+                self.faults.push_elsewhere(errors);
+                None
+            }
         }
     }
 

@@ -33,6 +33,12 @@ pub fn schema() -> Json {
         let table = describe(kind.about(), |t| format::primitive(t, kind));
         properties.insert(kind.name().into(), json!({"type": "array", "items": table}));
     }
+    let about = "Spheres from a file of rows.";
+    let table = describe(about, format::spheres);
+    properties.insert("spheres".into(), json!({"type": "array", "items": table}));
+    let about = "Lights from a file of rows.";
+    let table = describe(about, format::lights);
+    properties.insert("lights".into(), json!({"type": "array", "items": table}));
     let about = "A disk luminaire; reflects nothing.";
     let light = describe(about, |t| format::light(t, 0));
     properties.insert(
@@ -40,10 +46,9 @@ pub fn schema() -> Json {
         json!({"type": "array", "items": light, "minItems": 1}),
     );
 
-    let some_primitive = ShapeKind::ALL.map(|kind| {
-        let name = kind.name();
-        json!({"required": [name], "properties": {name: {"minItems": 1}}})
-    });
+    let some = |name: &str| json!({"required": [name], "properties": {name: {"minItems": 1}}});
+    let mut some_primitive: Vec<Json> = ShapeKind::ALL.map(|kind| some(kind.name())).into();
+    some_primitive.push(some("spheres"));
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "etendue scene",
@@ -51,8 +56,11 @@ pub fn schema() -> Json {
                         angles are degrees, colours and radiances linear RGB (Rec. 709).",
         "type": "object",
         "properties": properties,
-        "required": ["camera", "light"],
-        "anyOf": some_primitive,
+        "required": ["camera"],
+        "allOf": [
+            {"anyOf": some_primitive},
+            {"anyOf": [some("light"), some("lights")]},
+        ],
         "additionalProperties": false,
     })
 }

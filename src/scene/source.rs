@@ -95,6 +95,8 @@ pub(super) struct Faults {
     /// Byte offset, none for the whole file, and message.
     found: Vec<(Option<usize>, String)>,
     uncounted: usize,
+    /// Those in files that the scene names.
+    elsewhere: Vec<Diagnostic>,
 }
 
 impl Faults {
@@ -102,11 +104,17 @@ impl Faults {
         Self {
             found: Vec::new(),
             uncounted: 0,
+            elsewhere: Vec::new(),
         }
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.found.is_empty()
+        self.found.is_empty() && self.elsewhere.is_empty()
+    }
+
+    /// Errors in another file.
+    pub(super) fn push_elsewhere(&mut self, errors: Vec<Diagnostic>) {
+        self.elsewhere.extend(errors);
     }
 
     pub(super) fn push(&mut self, offset: Option<usize>, message: String) {
@@ -126,6 +134,7 @@ impl Faults {
             .into_iter()
             .map(|(offset, message)| source.diagnostic(offset, message))
             .collect();
+        diagnostics.extend(self.elsewhere);
         if self.uncounted > 0 {
             diagnostics.push(source.diagnostic(None, format!("{} more errors", self.uncounted)));
         }

@@ -40,6 +40,16 @@ pub(super) trait Value: Sized {
     fn to_json(&self) -> Json;
 }
 
+/// A kind of value that is one number; none if it breaks the rule.
+pub(super) trait FromNumber: Value {
+    fn from_number(x: f64) -> Option<Self>;
+}
+
+/// A kind of value that is three numbers; none if they break the rule.
+pub(super) trait FromVector: Value {
+    fn from_vector(v: DVec3) -> Option<Self>;
+}
+
 /// Numbers from `low` to `high`; both ends belong to it unless `open`.
 struct Interval {
     low: f64,
@@ -206,6 +216,11 @@ macro_rules! numbers {
                 json!(self.0)
             }
         }
+        impl FromNumber for $name {
+            fn from_number(x: f64) -> Option<Self> {
+                $interval.holds(x).then_some(Self(x))
+            }
+        }
     )*};
     ($($(#[$doc:meta])* $name:ident: three of $interval:ident;)*) => {$(
         $(#[$doc])*
@@ -223,6 +238,11 @@ macro_rules! numbers {
             }
             fn to_json(&self) -> Json {
                 json!(self.0.to_array())
+            }
+        }
+        impl FromVector for $name {
+            fn from_vector(v: DVec3) -> Option<Self> {
+                v.to_array().iter().all(|x| $interval.holds(*x)).then_some(Self(v))
             }
         }
     )*};
@@ -270,6 +290,13 @@ impl Value for Direction {
 
     fn to_json(&self) -> Json {
         json!(self.0.to_array())
+    }
+}
+
+impl FromVector for Direction {
+    fn from_vector(v: DVec3) -> Option<Self> {
+        let finite = v.to_array().iter().all(|x| FINITE.holds(*x));
+        normalized(v).filter(|_| finite).map(Self)
     }
 }
 

@@ -7,6 +7,7 @@ use crate::film::coverage::Rect;
 use crate::film::{BLOCK, Film};
 use crate::gpu::probe::{self, Probe, UNWRITTEN, Values};
 use crate::gpu::{Gpu, GpuEngine, GpuError};
+use crate::kernel::Access;
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
 use crate::stats::luminance;
@@ -50,6 +51,8 @@ impl From<GpuError> for Trouble {
 /// What the cases run on.
 pub struct Backend {
     gpu: Option<OpenGpu>,
+    /// The kind of kernel, instead of the one that a user gets.
+    access: Option<Access>,
     stop: Arc<AtomicBool>,
 }
 
@@ -70,13 +73,31 @@ impl Backend {
                 gpu: Arc::new(gpu),
                 probes: Mutex::default(),
             }),
+            access: None,
             stop,
         }
     }
 
+    /// The same with kernels of another kind than users get.
+    pub fn with_access(self, access: Access) -> Self {
+        Self {
+            access: Some(access),
+            ..self
+        }
+    }
+
+    /// The kind of kernel that is forced, if one is.
+    pub(super) fn access(&self) -> Option<Access> {
+        self.access
+    }
+
     /// The CPU reference.
     pub fn cpu(stop: Arc<AtomicBool>) -> Self {
-        Self { gpu: None, stop }
+        Self {
+            gpu: None,
+            access: None,
+            stop,
+        }
     }
 
     /// What it is.
@@ -108,7 +129,12 @@ impl Backend {
     ) -> Result<Box<dyn Engine>, Trouble> {
         let world = World::new(&build.0, settings.size);
         Ok(match &self.gpu {
-            Some(open) => Box::new(GpuEngine::on(open.gpu.clone(), &world, settings, None)?),
+            Some(open) => Box::new(GpuEngine::on(
+                open.gpu.clone(),
+                &world,
+                settings,
+                self.access,
+            )?),
             None => Box::new(CpuEngine::new(
                 world,
                 settings.clone(),

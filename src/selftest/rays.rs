@@ -119,7 +119,9 @@ impl<'a> Range<'a> {
     pub fn new(backend: &'a Backend, build: &Build, access: Option<Access>) -> Self {
         let settings = build.settings();
         let world = World::new(&build.0, settings.size);
-        let access = access.unwrap_or_else(|| Access::choose_for(&world, &backend.device()));
+        let access = access
+            .or(backend.access())
+            .unwrap_or_else(|| Access::choose_for(&world, &backend.device()));
         Self {
             backend,
             tracer: Tracer::new(world, settings, Estimator::LightSampling),
@@ -182,7 +184,8 @@ impl<'a> Range<'a> {
         let probe = match probes.get(&source) {
             Some(probe) => probe.clone(),
             None => {
-                let probe = Probe::compile(&open.gpu, &source, true).map_err(Trouble::Device)?;
+                let probe = Probe::compile(&open.gpu, &source, Some(self.access))
+                    .map_err(Trouble::Device)?;
                 probes.entry(source).or_insert(Arc::new(probe)).clone()
             }
         };

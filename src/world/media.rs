@@ -2,7 +2,7 @@
 //! a light shines in.
 
 use super::geometry::DiskSide;
-use super::{AIR, COINCIDENT, Geometry, Side, WorldLight, WorldPrimitive};
+use super::{AIR, Bounds, COINCIDENT, Geometry, Side, Tree, WorldLight, WorldPrimitive};
 use crate::scene::Bsdf;
 use glam::DVec3;
 
@@ -57,6 +57,49 @@ fn encloses(outer: &Geometry, inner: &Geometry, first: bool) -> bool {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Media {
     solids: Vec<Solid>,
+    index: Index,
+}
+
+/// Where solids are: which of them may hold or cut something.
+#[derive(Debug, Clone, PartialEq)]
+struct Index {
+    /// Over the boxes of those that have one.
+    tree: Tree,
+    /// Their numbers, in the order of the boxes.
+    bounded: Vec<usize>,
+    /// The others.
+    unbounded: Vec<usize>,
+}
+
+impl Index {
+    fn new<'a>(solids: impl Iterator<Item = &'a Geometry>) -> Self {
+        let (mut boxes, mut bounded, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, geometry) in solids.enumerate() {
+            match geometry.bounds() {
+                // What lies flush on a solid, within the tolerance, is about it too.
+                Some(b) => {
+                    let slack = (b.max - b.min) * (4.0 * COINCIDENT);
+                    boxes.push(Bounds {
+                        min: b.min - slack,
+                        max: b.max + slack,
+                    });
+                    bounded.push(k);
+                }
+                None => unbounded.push(k),
+            }
+        }
+        Self {
+            tree: Tree::new(&boxes),
+            bounded,
+            unbounded,
+        }
+    }
+
+    /// Calls `found` with every solid that may touch the box, in no order.
+    fn about(&self, bounds: &Bounds, mut found: impl FnMut(usize)) {
+        self.unbounded.iter().copied().for_each(&mut found);
+        self.tree.touching(bounds, |i| found(self.bounded[i]));
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -74,12 +117,19 @@ impl Media {
         let solids: Vec<usize> = (0..primitives.len())
             .filter(|&i| is_dielectric(&materials[primitives[i].material]))
             .collect();
+        let index = Index::new(solids.iter().map(|&i| &primitives[i].geometry));
         let around: Vec<Vec<usize>> = (0..solids.len())
             .map(|k| {
                 let inner = &primitives[solids[k]].geometry;
-                (0..solids.len())
-                    .filter(|&m| m != k && encloses(&primitives[solids[m]].geometry, inner, m < k))
-                    .collect()
+                let mut found = Vec::new();
+                index.about(&Bounds::about(inner.core().0, DVec3::ZERO), |m| {
+                    if m != k && encloses(&primitives[solids[m]].geometry, inner, m < k) {
+                        found.push(m);
+                    }
+                });
+                // In file order, which decides among equals.
+                found.sort_unstable();
+                found
             })
             .collect();
         for (k, &i) in solids.iter().enumerate() {
@@ -108,21 +158,27 @@ impl Media {
         };
         Self {
             solids: (0..solids.len()).map(solid).collect(),
+            index,
         }
     }
 
-    /// The innermost solid that `holds`.
-    fn innermost(&self, holds: impl Fn(&Geometry) -> bool) -> u32 {
-        let around = self.solids.iter().enumerate();
-        around
-            .filter(|(_, s)| holds(&s.geometry))
-            .max_by_key(|(_, s)| s.depth)
-            .map_or(AIR, |(k, _)| k as u32 + 1)
+    /// The innermost solid that `holds` among those that may touch a box.
+    fn innermost(&self, about: &Bounds, holds: impl Fn(&Geometry) -> bool) -> u32 {
+        let mut found = Vec::new();
+        self.index.about(about, |k| {
+            if holds(&self.solids[k].geometry) {
+                found.push(k);
+            }
+        });
+        found
+            .into_iter()
+            .max_by_key(|&k| (self.solids[k].depth, k))
+            .map_or(AIR, |k| k as u32 + 1)
     }
 
     /// The innermost solid around a point.
     pub(super) fn at(&self, p: DVec3) -> u32 {
-        self.innermost(|g| g.holds(p))
+        self.innermost(&Bounds::about(p, DVec3::ZERO), |g| g.holds(p))
     }
 
     /// Index of refraction of every medium, relative to air: air's, then those of the solids.
@@ -142,22 +198,26 @@ impl Media {
     /// The medium that a light shines in; `None` if a surface cuts it, or seems to.
     pub(super) fn of_light(&self, l: &WorldLight) -> Option<u32> {
         let side = |g: &Geometry| g.side_of_disk(l.center, l.normal, l.radius);
-        if self
-            .solids
-            .iter()
-            .any(|s| side(&s.geometry) == DiskSide::Cut)
-        {
-            return None;
-        }
-        Some(self.innermost(|g| side(g) == DiskSide::Inside))
+        let mut cut = false;
+        self.index.about(&around(l), |k| {
+            cut |= side(&self.solids[k].geometry) == DiskSide::Cut;
+        });
+        (!cut).then(|| self.innermost(&around(l), |g| side(g) == DiskSide::Inside))
     }
 
-    /// Whether any part of a light may lie inside a solid.
-    pub(super) fn may_hold(&self, solid: u32, lights: &[WorldLight]) -> bool {
-        solid != AIR
-            && lights.iter().any(|l| {
-                let g = &self.solids[solid as usize - 1].geometry;
-                g.side_of_disk(l.center, l.normal, l.radius) != DiskSide::Outside
-            })
+    /// For every medium, air first, whether it is a solid in which any part of a light may lie.
+    pub(super) fn holding(&self, lights: &[WorldLight]) -> Vec<bool> {
+        let mut holding = vec![false; self.solids.len() + 1];
+        for l in lights {
+            self.index.about(&around(l), |k| {
+                let g = &self.solids[k].geometry;
+                holding[k + 1] |= g.side_of_disk(l.center, l.normal, l.radius) != DiskSide::Outside;
+            });
+        }
+        holding
     }
+}
+
+fn around(l: &WorldLight) -> Bounds {
+    Bounds::disk(l.center, l.normal, l.radius)
 }

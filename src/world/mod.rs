@@ -19,8 +19,10 @@ mod faces;
 mod geometry;
 mod media;
 mod origin;
+mod tree;
 
 pub use geometry::Geometry;
+pub use tree::{Bounds, Node, Tree};
 
 use crate::scene::{Bsdf, Scene, order};
 use glam::DVec3;
@@ -183,8 +185,9 @@ impl World {
         for (l, &m) in lights.iter_mut().zip(shines_in.iter().flatten()) {
             l.radiance *= scales[m as usize];
         }
+        let holding = media.holding(&lights);
         for p in &mut primitives {
-            p.holds_light = media.may_hold(p.solid, &lights);
+            p.holds_light = holding[p.solid as usize];
         }
         origin::find_huge_spheres(&mut primitives, &lights, eye);
 

@@ -101,3 +101,44 @@ fn samples_that_are_not_finite_are_left_out_and_counted_by_replicate() {
         assert_eq!(e.mean[0], sum / 294.0);
     });
 }
+
+/// A film of `samples` of a hall of a hundred lamps, on a driver that grants `trips` loop trips.
+fn hall(trips: u64, samples: Range<u64>) -> Result<(Film, Counters), EngineError> {
+    let text = crate::scene::generate::lights(100, 0, "").scene;
+    let scene = parse::parse_str("hall.toml".as_ref(), &text).expect("a scene");
+    let flags = Overrides {
+        size: Some([16, 12]),
+        ..Overrides::default()
+    };
+    let settings = Settings::resolve(&scene, &flags);
+    let world = World::new(&scene, settings.size);
+    let mut gpu = Gpu::open(&Choice::default()).expect("an adapter");
+    gpu.trip_limit = trips;
+    let mut engine = GpuEngine::on(gpu, &world, &settings, None).expect("an engine");
+    assert_eq!(engine.kernel().access, Access::Tree);
+    let rect = Rect::whole([16, 12]);
+    let mut film = Film::new([16, 12], rect, settings.strata);
+    let stop = AtomicBool::new(false);
+    let counters = engine.render(&mut film, rect, samples, &stop)?;
+    Ok((film, counters))
+}
+
+#[test]
+fn want_of_loop_trips_changes_no_bit() {
+    let plenty = hall(60_000, 0..40).expect("samples");
+    let scant = hall(4_000, 0..40).expect("samples, a few at a time");
+    assert_eq!(plenty.0, scant.0);
+    assert_eq!(plenty.1, scant.1);
+    assert_eq!(plenty.1.paths, 40 * 192);
+}
+
+#[test]
+fn a_path_that_cannot_be_cut_is_refused_and_named() {
+    let refused = hall(300, 0..40).expect_err("too few for a path");
+    assert!(
+        refused
+            .to_string()
+            .contains("takes more than 300 loop trips"),
+        "{refused}"
+    );
+}

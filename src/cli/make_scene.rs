@@ -1,0 +1,31 @@
+//! `etendue make-scene`.
+
+use super::args::{MakeSceneArgs, SceneKind};
+use super::failure::Failure;
+use super::say;
+use crate::output::atomic;
+use crate::scene::generate;
+use std::io::Write as _;
+
+/// Writes a scene of many things, and the file of rows beside it that it needs.
+pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
+    let (default, make) = match args.kind {
+        SceneKind::Spheres => (
+            "spheres.toml",
+            generate::spheres as fn(usize, u32, &str) -> _,
+        ),
+        SceneKind::Lights => ("lights.toml", generate::lights as fn(usize, u32, &str) -> _),
+    };
+    let scene = args.output.clone().unwrap_or(default.into());
+    let rows = scene.with_extension("csv");
+    let name = rows.file_name().unwrap_or_default().to_string_lossy();
+    let made: generate::Generated = make(args.count as usize, args.seed, &name);
+    let mut written = vec![scene.display().to_string()];
+    if let Some(text) = &made.rows {
+        atomic::replace(&rows, |f| f.write_all(text.as_bytes()))?;
+        written.push(rows.display().to_string());
+    }
+    atomic::replace(&scene, |f| f.write_all(made.scene.as_bytes()))?;
+    say!("wrote {}", written.join(", "));
+    Ok(())
+}

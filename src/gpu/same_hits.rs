@@ -1,0 +1,256 @@
+//! Walks through trees against loops over all surfaces: the same surface at the same distance, to the bit.
+
+use super::probe::{Probe, Values};
+use super::{Choice, Gpu};
+use crate::kernel::{Access, scene_probe_source};
+use crate::scene::parse::parse_str;
+use crate::settings::{Overrides, Settings};
+use crate::world::{Geometry, World};
+use glam::DVec3;
+use std::fmt::Write as _;
+
+/// Rays into each scene.
+const RAYS: usize = 40_000;
+
+const BODY: &str = "
+    let ray = Ray(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), u32(x[6]), 0u, NO_FACE);
+    let hit = intersect(ray);
+    y[0] = select(f32(hit.key), -1.0, hit.key == NONE);
+    y[1] = hit.t;
+    let shadow = Ray(ray.o, ray.d, ray.face, 0u, u32(x[7]));
+    y[2] = select(0.0, 1.0, occluded(shadow, x[8], 0u));
+";
+
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f64 / (1u64 << 24) as f64
+    }
+
+    fn between(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.next()
+    }
+
+    fn vector(&mut self, half: f64) -> [f64; 3] {
+        [(); 3].map(|()| self.between(-half, half))
+    }
+}
+
+const STAGE: &str = "\
+[camera]
+eye = [0.3, 0.2, 30]
+look_at = [0, 0, 0]
+vfov = 40
+resolution = [8, 6]
+[material.white]
+type = 'diffuse'
+reflectance = [0.7, 0.7, 0.7]
+[material.glass]
+type = 'dielectric'
+[[light]]
+center = [0, 9, 0]
+normal = [0, -1, 0]
+radius = 0.5
+radiance = [9, 9, 9]
+";
+
+fn sphere(s: &mut String, center: [f64; 3], radius: f64, material: &str) {
+    let _ = writeln!(
+        s,
+        "[[sphere]]\ncenter = {center:?}\nradius = {radius:?}\nmaterial = '{material}'"
+    );
+}
+
+fn disk(s: &mut String, kind: &str, center: [f64; 3], normal: [f64; 3], radius: f64) {
+    let last = if kind == "disk" {
+        "material = 'white'"
+    } else {
+        "radiance = [1, 2, 3]"
+    };
+    let _ = writeln!(
+        s,
+        "[[{kind}]]\ncenter = {center:?}\nnormal = {normal:?}\nradius = {radius:?}\n{last}"
+    );
+}
+
+fn cylinder(s: &mut String, base: [f64; 3], top: [f64; 3], radius: f64, material: &str) {
+    let _ = writeln!(
+        s,
+        "[[cylinder]]\nbase = {base:?}\ntop = {top:?}\nradius = {radius:?}\nmaterial = '{material}'"
+    );
+}
+
+/// A bit of everything.
+fn mixed(r: &mut Numbers, of_each: usize) -> String {
+    let mut s = STAGE.to_owned();
+    s += "[[plane]]\npoint = [0, -6, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n";
+    for i in 0..of_each {
+        let material = if i % 3 == 0 { "glass" } else { "white" };
+        let size = r.between(0.02, 0.4);
+        sphere(&mut s, r.vector(5.0), size, material);
+        disk(&mut s, "disk", r.vector(5.0), r.vector(1.0), size);
+        let base = r.vector(5.0);
+        let along = r.vector(1.0);
+        let top = [0, 1, 2].map(|k| base[k] + along[k]);
+        cylinder(&mut s, base, top, 0.3 * size, material);
+        disk(&mut s, "light", r.vector(5.0), r.vector(1.0), 0.5 * size);
+    }
+    s
+}
+
+/// Spheres about one point, many of them equal.
+fn concentric(r: &mut Numbers) -> String {
+    let mut s = STAGE.to_owned();
+    for i in 0..150 {
+        let radius = if i % 2 == 0 { 2.0 } else { r.between(0.5, 3.0) };
+        sphere(
+            &mut s,
+            [1.0, 0.0, 0.0],
+            radius,
+            if i % 5 == 0 { "glass" } else { "white" },
+        );
+    }
+    s
+}
+
+/// One giant, and dust all over it.
+fn dust(r: &mut Numbers) -> String {
+    let mut s = STAGE.to_owned();
+    sphere(&mut s, [0.0, -1000.0, 0.0], 998.0, "white");
+    for _ in 0..200 {
+        let [x, y, z] = r.vector(4.0);
+        sphere(
+            &mut s,
+            [x, y.abs() * 0.01 - 2.0, z],
+            10f64.powf(r.between(-5.0, -1.0)),
+            "white",
+        );
+    }
+    s
+}
+
+/// Disks and lights in a few planes, one over the other.
+fn coplanar(r: &mut Numbers) -> String {
+    let mut s = STAGE.to_owned();
+    for i in 0..150 {
+        let [x, y, _] = r.vector(4.0);
+        let z = f64::from(i % 3);
+        let radius = r.between(0.1, 1.0);
+        if i % 2 == 0 {
+            disk(&mut s, "disk", [x, y, z], [0.0, 0.0, 1.0], radius);
+        } else {
+            disk(&mut s, "light", [x, y, z], [0.0, 0.0, -1.0], radius);
+        }
+        cylinder(&mut s, [y, x, z], [y, x, z + 1.0], 0.2, "white");
+    }
+    s
+}
+
+/// From a hundredth of a thousandth to a hundred thousand.
+fn scales(r: &mut Numbers) -> String {
+    let mut s = STAGE.to_owned();
+    for _ in 0..200 {
+        let scale = 10f64.powf(r.between(-2.0, 5.0));
+        let size = 0.2 * scale * r.next() + 1e-5;
+        let material = if r.next() < 0.2 { "glass" } else { "white" };
+        sphere(&mut s, r.vector(scale), size, material);
+        disk(&mut s, "disk", r.vector(scale), r.vector(1.0), size);
+    }
+    s
+}
+
+/// Rays from all about, some along the axes, some from surfaces, aimed at nothing or at the light.
+fn rays(world: &World, r: &mut Numbers, half: f64) -> Vec<Values> {
+    (0..RAYS)
+        .map(|i| {
+            let mut x: Values = [0.0; 16];
+            let from = r.vector(half).map(|v| v as f32);
+            let d = loop {
+                let v = r.vector(1.0);
+                let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+                if length > 0.1 && length < 1.0 {
+                    break v.map(|c| (c / length) as f32);
+                }
+            };
+            x[..3].copy_from_slice(&from);
+            x[3..6].copy_from_slice(&d);
+            if i % 10 == 0 {
+                let axis = i / 10 % 3;
+                for k in 0..3 {
+                    let sign = if r.next() < 0.5 { -1.0 } else { 1.0 };
+                    x[3 + k] = if k == axis { sign } else { sign * 0.0 };
+                }
+            }
+            if i % 3 == 0 {
+                // Standing on a face.
+                let p = &world.primitives[(r.next() * world.primitives.len() as f64) as usize];
+                let out = DVec3::from_array(r.vector(1.0)).normalize();
+                let at = match p.geometry {
+                    Geometry::Sphere { center, radius } => Some(center + radius * out),
+                    Geometry::Disk { center, .. } => Some(center),
+                    Geometry::Cylinder {
+                        base, axis, radius, ..
+                    } => Some(base + 0.1 * axis + radius * axis.cross(out).normalize()),
+                    _ => None,
+                };
+                if let Some(at) = at {
+                    x[..3].copy_from_slice(&at.as_vec3().to_array());
+                    x[6] = p.faces[0] as f32;
+                }
+            }
+            if i % 2 == 0 {
+                let l = &world.lights[(r.next() * world.lights.len() as f64) as usize];
+                x[7] = l.face as f32;
+            }
+            x[8] = (half * r.next()) as f32;
+            x
+        })
+        .collect()
+}
+
+#[test]
+fn a_walk_through_trees_meets_what_a_loop_meets() {
+    let gpu = Gpu::open(&Choice::default()).expect("an adapter");
+    let mut r = Numbers(11);
+    let scenes = [
+        ("few", mixed(&mut r, 3), 6.0),
+        ("mixed", mixed(&mut r, 60), 6.0),
+        ("concentric", concentric(&mut r), 4.0),
+        ("dust", dust(&mut r), 4.0),
+        ("coplanar", coplanar(&mut r), 5.0),
+        ("scales", scales(&mut r), 300.0),
+    ];
+    for (name, text, half) in scenes {
+        let scene = parse_str(format!("{name}.toml").as_ref(), &text).expect("a scene");
+        let settings = Settings::resolve(&scene, &Overrides::default());
+        let world = World::new(&scene, settings.size);
+        let inputs = rays(&world, &mut r, half);
+        let run = |access| {
+            let source = scene_probe_source(&world, &settings, access, BODY);
+            let probe = Probe::compile(&gpu, &source, Some(access)).expect("a probe");
+            probe.run(&gpu, Some(&world), &inputs).expect("outputs")
+        };
+        let (loops, walks) = (run(Access::Buffers), run(Access::Tree));
+        let hits = loops.iter().filter(|y| y[0] >= 0.0).count();
+        let shadows = loops.iter().filter(|y| y[2] == 1.0).count();
+        println!("{name}: {hits} hits, {shadows} shadows of {RAYS}");
+        assert!(
+            hits > RAYS / 100 && shadows > RAYS / 1000,
+            "{name}: {hits} {shadows}"
+        );
+        let same = |a: &Values, b: &Values| (0..3).all(|k| a[k].to_bits() == b[k].to_bits());
+        let wrong: Vec<usize> = (0..RAYS).filter(|&i| !same(&loops[i], &walks[i])).collect();
+        if let Some(&i) = wrong.first() {
+            let (x, a, b) = (&inputs[i][..9], &loops[i][..3], &walks[i][..3]);
+            panic!(
+                "{name}: {} of {RAYS} differ; {x:?}: {a:?}, but {b:?}",
+                wrong.len()
+            );
+        }
+    }
+}

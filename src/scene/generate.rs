@@ -1,0 +1,264 @@
+//! Scenes of many things, made by rule: a sunflower of spheres, and a hall of lamps.
+
+use std::f64::consts::{PI, TAU};
+use std::fmt::Write as _;
+
+/// Larger scenes keep their many things in a file of rows.
+pub const MOST_IN_TABLES: usize = 200;
+
+/// The angle between one seed of a sunflower and the next.
+const GOLDEN: f64 = PI * (3.0 - 2.236_067_977_499_79);
+
+/// The text of a scene, and that of its file of rows if it has one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Generated {
+    /// TOML.
+    pub scene: String,
+    /// Comma-separated rows.
+    pub rows: Option<String>,
+}
+
+/// Uniform numbers in [0, 1), one for each of `count` things and purposes [Steele2014].
+fn uniform(seed: u32, i: usize, purpose: u64) -> f64 {
+    let mut z = (u64::from(seed) << 32 ^ i as u64)
+        .wrapping_mul(8)
+        .wrapping_add(purpose + 1)
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// `count` spheres on a floor in the order of a sunflower's seeds: as much of the picture is covered whatever their
+/// number. `rows` names the file for them.
+pub fn spheres(count: usize, seed: u32, rows: &str) -> Generated {
+    let materials = ["amber", "rust", "cream", "slate"];
+    let mut scene = format!(
+        "title = \"{count} spheres\"
+
+[camera]
+eye        = [0.0, 2.1, 3.4]
+look_at    = [0.0, -0.1, 0.15]
+vfov       = 36.0
+resolution = [512, 384]
+
+[material.floor]
+type        = \"diffuse\"
+reflectance = [0.55, 0.54, 0.52]
+
+[material.amber]
+type        = \"diffuse\"
+reflectance = [0.85, 0.5, 0.12]
+
+[material.rust]
+type        = \"diffuse\"
+reflectance = [0.6, 0.18, 0.09]
+
+[material.cream]
+type        = \"diffuse\"
+reflectance = [0.85, 0.8, 0.68]
+
+[material.slate]
+type        = \"diffuse\"
+reflectance = [0.14, 0.27, 0.36]
+
+[material.gloss]
+type     = \"phong\"
+diffuse  = [0.12, 0.12, 0.13]
+specular = [0.6, 0.6, 0.62]
+exponent = 80.0
+
+[[plane]]
+point    = [0.0, 0.0, 0.0]
+normal   = [0.0, 1.0, 0.0]
+material = \"floor\"
+
+[[light]]
+center   = [-2.2, 3.6, 1.2]
+normal   = [2.2, -3.6, -1.2]
+radius   = 0.8
+radiance = [17.0, 15.0, 12.0]
+
+[[light]]
+center   = [3.0, 2.6, -2.5]
+normal   = [-3.0, -2.6, 2.5]
+radius   = 0.9
+radiance = [2.5, 3.5, 5.0]
+"
+    );
+    let mut list = List::new(count, "x,y,z,radius,material");
+    // Seeds have this much room from centre to edge.
+    let room = 1.4 * (PI / count as f64).sqrt();
+    for i in 0..count {
+        let out = 1.4 * ((i as f64 + 0.5) / count as f64).sqrt();
+        let angle = GOLDEN * i as f64;
+        let radius = room * (0.27 + 0.2 * uniform(seed, i, 0));
+        let at = [out * angle.cos(), radius, out * angle.sin()];
+        // Arms of the spiral, with a stranger here and there.
+        let material = if uniform(seed, i, 1) < 0.1 {
+            "gloss"
+        } else {
+            materials[[0, 1, 0, 2, 3, 2, 1, 0][(i % 34) * 8 / 34]]
+        };
+        list.add(
+            format_args!("{:.6},{:.6},{:.6},{radius:.6},{material}", at[0], at[1], at[2]),
+            format_args!(
+                "\n[[sphere]]\ncenter   = [{:.6}, {:.6}, {:.6}]\nradius   = {radius:.6}\nmaterial = \"{material}\"\n",
+                at[0], at[1], at[2]
+            ),
+        );
+    }
+    list.finish(&mut scene, "spheres", rows)
+}
+
+/// A hall of columns under `count` lamps. `rows` names the file for them.
+pub fn lights(count: usize, seed: u32, rows: &str) -> Generated {
+    let mut scene = format!(
+        "title = \"A hall of {count} lamps\"
+
+[camera]
+eye        = [0.0, 1.5, 7.6]
+look_at    = [0.0, 1.75, 0.0]
+vfov       = 52.0
+resolution = [512, 384]
+
+[material.stone]
+type        = \"diffuse\"
+reflectance = [0.72, 0.7, 0.66]
+
+[material.column]
+type        = \"diffuse\"
+reflectance = [0.8, 0.78, 0.74]
+
+[material.marble]
+type     = \"phong\"
+diffuse  = [0.25, 0.25, 0.27]
+specular = [0.4, 0.4, 0.4]
+exponent = 120.0
+"
+    );
+    for (point, normal, material) in [
+        ("[0.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]", "marble"),
+        ("[0.0, 4.0, 0.0]", "[0.0, -1.0, 0.0]", "stone"),
+        ("[-4.0, 0.0, 0.0]", "[1.0, 0.0, 0.0]", "stone"),
+        ("[4.0, 0.0, 0.0]", "[-1.0, 0.0, 0.0]", "stone"),
+        ("[0.0, 0.0, -12.0]", "[0.0, 0.0, 1.0]", "stone"),
+        ("[0.0, 0.0, 8.0]", "[0.0, 0.0, -1.0]", "stone"),
+    ] {
+        let _ = write!(
+            scene,
+            "\n[[plane]]\npoint    = {point}\nnormal   = {normal}\nmaterial = \"{material}\"\n"
+        );
+    }
+    for i in 0..9 {
+        for x in [-2.6, 2.6] {
+            let z = 5.5 - 2.0 * f64::from(i);
+            let _ = write!(
+                scene,
+                "\n[[cylinder]]\nbase     = [{x:.1}, 0.0, {z:.1}]\ntop      = [{x:.1}, 4.0, {z:.1}]\nradius   = 0.22\nmaterial = \"column\"\n"
+            );
+        }
+    }
+    let mut list = List::new(count, "x,y,z,nx,ny,nz,radius,r,g,b");
+    // As much light in all, whatever the number.
+    let room = (7.4 * 19.0 / count as f64).sqrt();
+    let radius = 0.12 * room.min(1.0);
+    for i in 0..count {
+        let u = [0, 1, 2, 3].map(|k| uniform(seed, i, k));
+        // Evenly over the ceiling, by additive recurrence; hung in waves.
+        let (a, b) = (
+            (0.5 + 0.754_877_67 * i as f64).fract(),
+            (0.5 + 0.569_840_29 * i as f64).fract(),
+        );
+        // Not where columns stand: 2.2 to 3 to either side.
+        let across = (a - 0.5).abs() * 5.8;
+        let x = (a - 0.5).signum() * (across + if across > 2.2 { 0.8 } else { 0.0 });
+        let z = 7.5 - 19.0 * b;
+        let y = 3.1 + 0.35 * (TAU * (x / 5.0 + z / 9.0)).sin() + 0.25 * u[0];
+        let hue = (0.5 * b + 0.2 * a + 0.15 * u[1]).fract();
+        let [r, g, b] = [0.0, 1.0 / 3.0, 2.0 / 3.0]
+            .map(|turn| 0.08 + 0.92 * (0.5 + 0.5 * (TAU * (hue + turn)).cos()).powi(2))
+            .map(|c| {
+                180.0 * c * (0.6 + 0.8 * u[2]) * (0.0144 / (radius * radius) * room * room / 7.0)
+            });
+        let tilt = [u[2] - 0.5, u[3] - 0.5].map(|t| 0.5 * t);
+        list.add(
+            format_args!(
+                "{x:.6},{y:.6},{z:.6},{:.4},-1,{:.4},{radius:.6},{r:.4},{g:.4},{b:.4}",
+                tilt[0], tilt[1]
+            ),
+            format_args!(
+                "\n[[light]]\ncenter   = [{x:.6}, {y:.6}, {z:.6}]\nnormal   = [{:.4}, -1.0, {:.4}]\nradius   = {radius:.6}\nradiance = [{r:.4}, {g:.4}, {b:.4}]\n",
+                tilt[0], tilt[1]
+            ),
+        );
+    }
+    list.finish(&mut scene, "lights", rows)
+}
+
+/// Things as tables while they are few, else as rows.
+struct List {
+    text: String,
+    rows: bool,
+}
+
+impl List {
+    fn new(count: usize, columns: &str) -> Self {
+        let rows = count > MOST_IN_TABLES;
+        let text = if rows {
+            format!("{columns}\n")
+        } else {
+            String::new()
+        };
+        Self { text, rows }
+    }
+
+    fn add(&mut self, row: std::fmt::Arguments, table: std::fmt::Arguments) {
+        let _ = match self.rows {
+            true => writeln!(self.text, "{row}"),
+            false => self.text.write_fmt(table),
+        };
+    }
+
+    fn finish(self, scene: &mut String, key: &str, name: &str) -> Generated {
+        if self.rows {
+            let _ = write!(scene, "\n[[{key}]]\nfile = {name:?}\n");
+        } else {
+            scene.push_str(&self.text);
+        }
+        Generated {
+            scene: std::mem::take(scene),
+            rows: self.rows.then_some(self.text),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{hash::scene_hash, parse::parse_str};
+    use crate::settings::{Overrides, Settings};
+
+    #[test]
+    fn few_things_are_tables_and_many_are_rows_with_the_same_meaning() {
+        for make in [spheres, lights] {
+            let few = make(MOST_IN_TABLES, 3, "x.csv");
+            assert_eq!(few.rows, None);
+            let scene = parse_str("x.toml".as_ref(), &few.scene).expect("a scene");
+            assert_eq!(
+                scene.primitives.len().max(scene.lights.len()) / MOST_IN_TABLES,
+                1
+            );
+            // The same by hand from a file of rows.
+            let folder = tempfile::tempdir().expect("a folder");
+            let many = make(MOST_IN_TABLES + 1, 3, "x.csv");
+            std::fs::write(folder.path().join("x.csv"), many.rows.expect("rows")).expect("written");
+            let from_rows = parse_str(&folder.path().join("x.toml"), &many.scene).expect("a scene");
+            let hash = |s: &crate::scene::Scene| {
+                scene_hash(s, &Settings::resolve(s, &Overrides::default()))
+            };
+            assert_eq!(hash(&from_rows), hash(&from_rows.clone()));
+            assert_ne!(hash(&from_rows), hash(&scene));
+        }
+    }
+}

@@ -1,0 +1,333 @@
+//! Many spheres or lights from one file of comma-separated rows: `[[spheres]]` and `[[lights]]`.
+//!
+//! The first row names the columns, in any order; every other row is one thing. Fields are numbers and names of materials:
+//! there is nothing to quote.
+
+use super::source::{quoted, suggestion};
+use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius, Value};
+use super::{Diagnostic, Light, Primitive, Shape};
+use glam::DVec3;
+use std::fs::File;
+use std::io::Read as _;
+use std::path::Path;
+
+/// The largest file of rows that is read, in bytes; that is five million spheres or more.
+pub const MAX_ROWS_BYTES: u64 = 256 << 20;
+
+/// The most errors reported for one file.
+const MAX_ERRORS: usize = 20;
+
+/// Columns of spheres, without that of their materials.
+const SPHERE: [&str; 4] = ["x", "y", "z", "radius"];
+const MATERIAL: &str = "material";
+/// Columns of lights: centre, normal, radius, radiance.
+const LIGHT: [&str; 10] = ["x", "y", "z", "nx", "ny", "nz", "radius", "r", "g", "b"];
+
+/// What is wrong with a file of rows: that it can't be read, or its content.
+pub(super) enum Wrong {
+    File(String),
+    Content(Vec<Diagnostic>),
+}
+
+/// The spheres in a file; `material` finds one by name, or says what is wrong with it, and `common` is that of all if
+/// there is no such column.
+pub(super) fn spheres(
+    path: &Path,
+    line: usize,
+    common: Option<usize>,
+    material: impl Fn(&str) -> Result<usize, String>,
+) -> Result<Vec<Primitive>, Wrong> {
+    let text = read(path)?;
+    let mut rows = Rows::new(path, &text);
+    let optional: &[&str] = if common.is_some() { &[] } else { &[MATERIAL] };
+    let columns = rows.header(&SPHERE, optional)?;
+    let mut spheres = Vec::new();
+    rows.each(columns.len(), |row| {
+        let [x, y, z, radius] = [0, 1, 2, 3].map(|k| columns[k]);
+        let center = row.vector::<Point>([x, y, z])?.0;
+        let radius = row.number::<Radius>(radius)?.0;
+        let material = match common {
+            Some(material) => material,
+            None => material(row.field(columns[4])).map_err(|e| (columns[4], e))?,
+        };
+        spheres.push(Primitive {
+            shape: Shape::Sphere { center, radius },
+            material,
+            line,
+        });
+        Ok(())
+    })?;
+    Ok(spheres)
+}
+
+/// The lights in a file.
+pub(super) fn lights(path: &Path, line: usize) -> Result<Vec<Light>, Wrong> {
+    let text = read(path)?;
+    let mut rows = Rows::new(path, &text);
+    let c = rows.header(&LIGHT, &[])?;
+    let mut lights = Vec::new();
+    rows.each(c.len(), |row| {
+        lights.push(Light {
+            center: row.vector::<Point>([c[0], c[1], c[2]])?.0,
+            normal: row.vector::<Direction>([c[3], c[4], c[5]])?.0,
+            radius: row.number::<Radius>(c[6])?.0,
+            radiance: row.vector::<Radiance>([c[7], c[8], c[9]])?.0,
+            line,
+        });
+        Ok(())
+    })?;
+    Ok(lights)
+}
+
+fn read(path: &Path) -> Result<String, Wrong> {
+    let system = |e: std::io::Error| Wrong::File(e.to_string());
+    let file = File::open(path).map_err(system)?;
+    let mut bytes = Vec::new();
+    file.take(MAX_ROWS_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(system)?;
+    if bytes.len() as u64 > MAX_ROWS_BYTES {
+        let limit = MAX_ROWS_BYTES >> 20;
+        return Err(Wrong::File(format!(
+            "a file of rows has at most {limit} MiB"
+        )));
+    }
+    String::from_utf8(bytes).map_err(|_| Wrong::File("it is not UTF-8 text".into()))
+}
+
+/// A file, row by row.
+struct Rows<'a> {
+    path: &'a Path,
+    lines: std::iter::Enumerate<std::str::Lines<'a>>,
+    errors: Vec<Diagnostic>,
+}
+
+impl<'a> Rows<'a> {
+    fn new(path: &'a Path, text: &'a str) -> Self {
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+        Self {
+            path,
+            lines: text.lines().enumerate(),
+            errors: Vec::new(),
+        }
+    }
+
+    fn wrong(&mut self, line: usize, column: usize, message: String) {
+        self.errors.push(Diagnostic {
+            path: self.path.to_owned(),
+            line,
+            column,
+            message,
+        });
+    }
+
+    /// Where the columns `wanted`, all of them, stand.
+    fn header(&mut self, always: &[&str], besides: &[&str]) -> Result<Vec<usize>, Wrong> {
+        let wanted = || always.iter().chain(besides).copied();
+        let rule = format!(
+            "the first row names the columns {}",
+            wanted().collect::<Vec<_>>().join(", ")
+        );
+        let Some((_, header)) = self.lines.next() else {
+            self.wrong(0, 0, format!("is empty; {rule}"));
+            return Err(Wrong::Content(std::mem::take(&mut self.errors)));
+        };
+        let row = Row { line: header };
+        let names: Vec<&str> = header.split(',').map(str::trim).collect();
+        for (k, name) in names.iter().enumerate() {
+            let problem = if !wanted().any(|w| w == *name) {
+                "unknown"
+            } else if names[..k].contains(name) {
+                "second"
+            } else {
+                continue;
+            };
+            let message = format!(
+                "{problem} column {}; {rule}{}",
+                quoted(name),
+                suggestion(name, wanted())
+            );
+            self.wrong(1, row.place(k), message);
+        }
+        let mut columns = Vec::new();
+        for name in wanted() {
+            match names.iter().position(|n| n == &name) {
+                Some(k) => columns.push(k),
+                None => self.wrong(1, 0, format!("no column {name}; {rule}")),
+            }
+        }
+        if self.errors.is_empty() {
+            Ok(columns)
+        } else {
+            Err(Wrong::Content(std::mem::take(&mut self.errors)))
+        }
+    }
+
+    /// Calls `read` for every row with just `count` fields; its error is a column and a message.
+    fn each(
+        mut self,
+        count: usize,
+        mut read: impl FnMut(Row<'a>) -> Result<(), (usize, String)>,
+    ) -> Result<(), Wrong> {
+        while let Some((i, line)) = self.lines.next() {
+            if line.trim().is_empty() {
+                continue;
+            }
+            let fields = line.split(',').count();
+            let row = Row { line };
+            if fields != count {
+                self.wrong(
+                    i + 1,
+                    0,
+                    format!("{fields} fields, but the first row names {count} columns"),
+                );
+            } else if let Err((column, message)) = read(row) {
+                self.wrong(i + 1, row.place(column), message);
+            }
+            if self.errors.len() == MAX_ERRORS {
+                break;
+            }
+        }
+        if self.errors.is_empty() {
+            Ok(())
+        } else {
+            Err(Wrong::Content(self.errors))
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    line: &'a str,
+}
+
+impl<'a> Row<'a> {
+    fn field(self, k: usize) -> &'a str {
+        self.line.split(',').nth(k).unwrap_or_default().trim()
+    }
+
+    /// Column in characters, from 1, of field `k`.
+    fn place(self, k: usize) -> usize {
+        let before: usize = self
+            .line
+            .split(',')
+            .take(k)
+            .map(|f| f.chars().count() + 1)
+            .sum();
+        let field = self.line.split(',').nth(k).unwrap_or_default();
+        1 + before + (field.chars().count() - field.trim_start().chars().count())
+    }
+
+    fn float(self, k: usize) -> Option<f64> {
+        self.field(k).parse().ok()
+    }
+
+    fn number<T: FromNumber>(self, k: usize) -> Result<T, (usize, String)> {
+        let value = self.float(k).and_then(T::from_number);
+        value.ok_or_else(|| (k, self.message::<T>(k)))
+    }
+
+    fn vector<T: FromVector>(self, columns: [usize; 3]) -> Result<T, (usize, String)> {
+        let parts = columns.map(|k| self.float(k));
+        if let [Some(x), Some(y), Some(z)] = parts
+            && let Some(value) = T::from_vector(DVec3::new(x, y, z))
+        {
+            return Ok(value);
+        }
+        // The first that is wrong by itself, else the first.
+        let wrong = columns.iter().copied().find(|&k| {
+            self.float(k)
+                .is_none_or(|x| T::from_vector(DVec3::new(x, x, x)).is_none())
+        });
+        let k = wrong.unwrap_or(columns[0]);
+        Err((k, self.message::<T>(k)))
+    }
+
+    fn message<T: Value>(self, k: usize) -> String {
+        format!(
+            "{} is not what is wanted here: {}",
+            quoted(self.field(k)),
+            T::rule()
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn temporary(text: &str) -> tempfile::NamedTempFile {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        std::fs::write(file.path(), text).expect("written");
+        file
+    }
+
+    fn faults(text: &str) -> Vec<String> {
+        let file = temporary(text);
+        let named = |name: &str| {
+            if name == "red" {
+                Ok(7)
+            } else {
+                Err(format!("no {name}"))
+            }
+        };
+        match spheres(file.path(), 3, None, named) {
+            Ok(_) => Vec::new(),
+            Err(Wrong::File(message)) => vec![message],
+            Err(Wrong::Content(all)) => all
+                .iter()
+                .map(|d| format!("{}:{}: {}", d.line, d.column, d.message))
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn columns_may_stand_in_any_order() {
+        let file = temporary("radius, z,y,x ,material\n 2,3,4,5, red \n\n1e-3,0,-1,+2.5,red\r\n");
+        let all = spheres(file.path(), 3, None, |_| Ok(7))
+            .ok()
+            .expect("spheres");
+        let center = DVec3::new(5.0, 4.0, 3.0);
+        assert_eq!(
+            all[0].shape,
+            Shape::Sphere {
+                center,
+                radius: 2.0
+            }
+        );
+        assert_eq!((all.len(), all[1].material, all[1].line), (2, 7, 3));
+        let file = temporary("x,y,z,nx,ny,nz,radius,r,g,b\n1,2,3,0,-2,0,0.5,9,8,7\n");
+        let all = lights(file.path(), 3).ok().expect("lights");
+        assert_eq!(
+            (all[0].normal, all[0].radiance),
+            (DVec3::NEG_Y, DVec3::new(9.0, 8.0, 7.0))
+        );
+    }
+
+    #[test]
+    fn faults_have_their_places() {
+        assert_eq!(
+            faults("x,y,z,radius,material\n1,2,3,1,red\n1,two,3,1,red\n1,2,3,-1,blue\n"),
+            [
+                "3:3: \"two\" is not what is wanted here: three numbers from -1e15 to 1e15 (limits of f32 kernels)",
+                "4:7: \"-1\" is not what is wanted here: a number from 1e-15 to 1e15 (limits of f32 kernels)"
+            ]
+        );
+        assert_eq!(
+            faults("x,y,z,radius,material\n0,0,0,1, blue\n"),
+            ["2:10: no blue"]
+        );
+        let short = faults("x,y,z,radius,material\n0,0,0,1\n");
+        assert_eq!(short, ["2:0: 4 fields, but the first row names 5 columns"]);
+        let rule = "the first row names the columns x, y, z, radius, material";
+        assert_eq!(
+            faults("x,y,z,radios,material\n"),
+            [
+                format!("1:7: unknown column \"radios\"; {rule}; did you mean \"radius\"?"),
+                format!("1:0: no column radius; {rule}")
+            ]
+        );
+        assert_eq!(faults(""), [format!("0:0: is empty; {rule}")]);
+        assert_eq!(faults("x,y,z,radius,material\n0,0,0,nan,red\n").len(), 1);
+    }
+}
