@@ -10,6 +10,8 @@ struct Fake {
     calls: Vec<(Rect, Range<u64>)>,
     nap: Duration,
     fail_at: Option<usize>,
+    seed: u32,
+    value: fn(u64) -> f64,
 }
 
 impl Fake {
@@ -24,14 +26,18 @@ impl Fake {
             calls: Vec::new(),
             nap: Duration::ZERO,
             fail_at: None,
+            seed: 0,
+            value: |h| (h >> 40) as f64 / (1u64 << 24) as f64,
         }
     }
 }
 
-/// A value in 0..1 from a pixel and a sample.
-fn noise(x: u32, y: u32, s: u64) -> f64 {
+/// Bits from a seed, a pixel and a sample.
+fn noise(seed: u32, x: u32, y: u32, s: u64) -> u64 {
     let h = (u64::from(x) << 40 ^ u64::from(y) << 20 ^ s).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    ((h ^ (h >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f64 / (1u64 << 24) as f64
+    let h = (h ^ (h >> 29)).wrapping_add(u64::from(seed).wrapping_mul(0x94d0_49bb_1331_11eb));
+    let h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb)
 }
 
 impl Engine for Fake {
@@ -58,7 +64,7 @@ impl Engine for Fake {
             .map(|(x, y)| {
                 let mut sums: [Sums<f64>; REPLICATES] = film.sums()[film.index(x, y)];
                 for s in samples.clone() {
-                    let v = noise(x, y, s);
+                    let v = (self.value)(noise(self.seed, x, y, s));
                     let r = &mut sums[(s / round) as usize % REPLICATES];
                     *r = [r[0] + v, r[1] + v, r[2] + v, r[3] + v * v];
                 }
@@ -75,6 +81,10 @@ impl Engine for Fake {
         })
     }
 
+    fn reseed(&mut self, seed: u32) {
+        self.seed = seed;
+    }
+
     fn device(&self) -> &DeviceInfo {
         &self.device
     }
@@ -88,6 +98,7 @@ fn job(size: [u32; 2], limit: u64, samples: Range<u64>) -> Job {
         time: None,
         error: None,
         call: CALL,
+        adaptive: None,
     }
 }
 
