@@ -6,7 +6,7 @@
 //! their samples. Here a *pilot*, samples of another seed that are in no sum of the film, says how noisy each tile is,
 //! and nothing else does. Given the pilot, every count is a fixed number, so the mean of every pixel is unbiased and
 //! the spread of its replicates is its error, as without. A long run looks again: pilots double while the
-//! picture grows fourfold, and later counts rest on all of them.
+//! picture grows sixteenfold, and later counts rest on all of them.
 //!
 //! The relative error is √ mean v/n over pixels, v being a pixel's relative variance for one sample. For a given mean
 //! of n it is least where n is proportional to √v, here to that of a tile's mean v. A pilot knows v roughly, and
