@@ -23,6 +23,9 @@ pub trait Engine {
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError>;
 
+    /// Goes on with another seed.
+    fn reseed(&mut self, seed: u32);
+
     /// What it runs on.
     fn device(&self) -> &DeviceInfo;
 }

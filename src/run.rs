@@ -12,6 +12,8 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+mod adaptive;
+
 /// How long a call to the engine should take: short enough for progress to move and for a signal to cost little, long
 /// enough that the calls' own cost (reading back and folding, 10 to 20 ms at 512 x 384) does not matter.
 pub const CALL: Duration = Duration::from_millis(1000);
@@ -43,6 +45,9 @@ pub struct Job {
     pub error: Option<f64>,
     /// How long a call to the engine should take at most, usually [`CALL`].
     pub call: Duration,
+    /// Samples go where the noise is, by pilots made with a seed that differs from this one, the engine's; `samples`
+    /// then starts at 0 and ends at the mean that the pixels are to have.
+    pub adaptive: Option<u32>,
 }
 
 /// What ended a run.
@@ -162,8 +167,13 @@ impl<'a> Run<'a> {
         stop: &'a AtomicBool,
     ) -> Self {
         let pixels: u64 = job.tiles.iter().map(Rect::area).sum();
-        let samples = (job.samples.end - job.samples.start) as f64
-            - missing(&film.coverage, job) / pixels as f64;
+        let samples = match job.adaptive {
+            Some(_) => held(&film.coverage, job) / pixels as f64,
+            None => {
+                (job.samples.end - job.samples.start) as f64
+                    - missing(&film.coverage, job) / pixels as f64
+            }
+        };
         Self {
             job,
             engine,
@@ -186,6 +196,9 @@ impl<'a> Run<'a> {
         &mut self,
         mut after: impl FnMut(&Film, &Tally) -> Result<(), E>,
     ) -> Result<StopReason, E> {
+        if let Some(seed) = self.job.adaptive {
+            return self.go_adaptive(seed, after);
+        }
         let job = self.job;
         let mut at = job.samples.start;
         'passes: loop {
@@ -228,8 +241,24 @@ impl<'a> Run<'a> {
     /// One call to the engine; false when it was stopped.
     fn call(&mut self, rect: Rect, samples: Range<u64>) -> Result<bool, EngineError> {
         let work = rect.area() as f64 * (samples.end - samples.start) as f64;
+        let done = self.call_on(None, rect, samples)?;
+        if done {
+            self.tally.samples += work / self.pixels as f64;
+        }
+        Ok(done)
+    }
+
+    /// One call to the engine, on another film than the run's if one is given; false when it was stopped.
+    fn call_on(
+        &mut self,
+        other: Option<&mut Film>,
+        rect: Rect,
+        samples: Range<u64>,
+    ) -> Result<bool, EngineError> {
+        let work = rect.area() as f64 * (samples.end - samples.start) as f64;
         let begun = Instant::now();
-        let result = self.engine.render(self.film, rect, samples, self.stop);
+        let film = other.unwrap_or(self.film);
+        let result = self.engine.render(film, rect, samples, self.stop);
         let seconds = begun.elapsed().as_secs_f64();
         self.tally.seconds += seconds;
         match result {
@@ -237,7 +266,6 @@ impl<'a> Run<'a> {
             Err(EngineError::Stopped) => return Ok(false),
             Err(e) => return Err(e),
         }
-        self.tally.samples += work / self.pixels as f64;
         self.pace = Some(seconds / work);
         Ok(true)
     }
@@ -320,6 +348,16 @@ fn first_missing(coverage: &Coverage, job: &Job, from: u64) -> u64 {
         .filter_map(|(_, ranges)| ranges.first().map(|r| r.start))
         .min()
         .unwrap_or(job.samples.end)
+}
+
+/// Samples times pixels that the film has of the job's tiles.
+fn held(coverage: &Coverage, job: &Job) -> f64 {
+    let of = |(rect, ranges): (Rect, &[Range<u64>])| {
+        let parts = job.tiles.iter().filter_map(|t| t.intersection(&rect));
+        let pixels: u64 = parts.map(|r| r.area()).sum();
+        pixels as f64 * ranges.iter().map(|r| r.end - r.start).sum::<u64>() as f64
+    };
+    coverage.cells().map(of).sum()
 }
 
 /// Samples times pixels that the job still lacks.

@@ -4,8 +4,11 @@
 mod common;
 
 use common::{add, film, gpu, named_scene, settings};
+use etendue::engine::EngineError;
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
+use etendue::run::{CALL, Job, Run, tiles};
+use std::sync::atomic::AtomicBool;
 
 const SEEDS: u32 = 64;
 const SAMPLES: [u64; 3] = [16, 64, 256];
@@ -87,4 +90,48 @@ fn caustic() {
 #[test]
 fn several_lights() {
     check("several_lights", [32, 24]);
+}
+
+/// Samples that went where pilots had found the noise: the error is as true, and the mean of all pictures is the reference.
+#[test]
+fn adaptive() {
+    let (s, size) = (named_scene("caustic"), [48, 36]);
+    let settings = settings(&s, size, 0);
+    let mut engine = gpu(&s, &settings, None);
+    let reference = pixels(&film(&mut engine, &settings, REFERENCE_SAMPLES));
+    let (mut squares_of, mut light, mut spread) = (Vec::new(), Vec::new(), 0);
+    for seed in 1..=SEEDS {
+        engine.reseed(seed);
+        let job = Job {
+            tiles: tiles(&[Rect::whole(size)], u64::MAX),
+            samples: 0..128,
+            round: settings.round(),
+            time: None,
+            error: None,
+            call: CALL,
+            adaptive: Some(seed),
+        };
+        let mut film = Film::new(size, Rect::whole(size), settings.strata);
+        Run::new(&job, &mut engine, &mut film, &AtomicBool::new(false))
+            .go(|_, _| Ok::<(), EngineError>(()))
+            .expect("renders");
+        let (least, most) = film.coverage.samples();
+        spread += most - least;
+        squares_of.push(squares(&pixels(&film), &reference));
+        light.push(film.mean_luminance());
+    }
+    assert!(spread > 16 * u64::from(SEEDS), "nothing was steered");
+    let (ratio, error) = ratio(&squares_of);
+    println!("adaptive caustic: true / stated error = {ratio:.3} ± {error:.3}");
+    assert!((0.9..=1.1).contains(&ratio) && error <= 0.05);
+
+    engine.reseed(0);
+    let truth = film(&mut engine, &settings, REFERENCE_SAMPLES).mean_luminance();
+    let n = light.len() as f64;
+    let mean = light.iter().sum::<f64>() / n;
+    let variance = light.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    // The reference has as many samples as all pictures together.
+    let error = (2.0 * variance / n).sqrt();
+    println!("mean light {mean:.5}, of the reference {truth:.5}, ± {error:.5}");
+    assert!((mean - truth).abs() < 4.0 * error);
 }

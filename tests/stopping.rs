@@ -52,6 +52,7 @@ fn stopped(case: &Case, scene: &Scene, seed: u32) -> Film {
         time: None,
         error: Some(case.target),
         call: CALL,
+        adaptive: None,
     };
     let mut film = Film::new(case.size, whole, settings.strata);
     let mut engine = gpu(scene, &settings, None);

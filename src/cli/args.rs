@@ -178,6 +178,10 @@ pub struct RenderArgs {
     /// `--samples A..B`.
     pub samples: Option<Range<u64>>,
 
+    /// Sample where the error is: --spp and --rays are then the mean over the pixels. Pilots, samples that are in no picture,
+    /// decide where; they take a tenth of the time of short runs, and less of long ones. A film made so is gone on with so
+    #[arg(long, conflicts_with = "samples", help_heading = "What to render")]
+    pub adaptive: bool,
     /// Width and height in pixels instead of the scene's
     #[arg(long, value_name = "WxH", value_parser = values::size, help_heading = "What to render")]
     pub size: Option<[u32; 2]>,

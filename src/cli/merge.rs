@@ -3,7 +3,7 @@
 use super::args::MergeArgs;
 use super::failure::Failure;
 use super::{memory, say};
-use crate::film::merge::{MergeError, holes, merge as add};
+use crate::film::merge::{HoleKind, MergeError, holes, merge as add};
 use crate::film::store::{self, Outline};
 use crate::output::{FileError, atomic};
 use std::path::{Path, PathBuf};
@@ -37,7 +37,10 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     }
     provenance.describe(&film);
 
-    let holes = holes(&film);
+    let mut holes = holes(&film);
+    if films.iter().any(|(_, its)| its.adaptive) {
+        holes.retain(|hole| hole.kind != HoleKind::Short);
+    }
     for hole in holes.iter().take(LISTED_HOLES) {
         say!("warning: {hole}");
     }

@@ -6,6 +6,7 @@ use super::progress::{clock, percent};
 use super::values::MAX_SAMPLES;
 use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
+use crate::output::FileError;
 use crate::settings::Settings;
 use std::ops::Range;
 use std::path::Path;
@@ -50,6 +51,24 @@ pub fn check_bounds(path: &Path, film: &Film, bounds: Rect) -> Result<(), Failur
     )))
 }
 
+/// Refuses to go on adaptively with a film that was not made so, or of other regions, and evenly with one that was.
+pub fn check_adaptive(
+    args: &RenderArgs,
+    path: &Path,
+    film: &Film,
+    regions: &[Rect],
+) -> Result<(), Failure> {
+    let problem = match &film.pilot {
+        Some(_) if !args.adaptive => "this film was made with --adaptive, and only goes on with it",
+        None if args.adaptive => "this film was made without --adaptive, and only goes on without",
+        Some(pilot) if !pilot.is_for(regions) => {
+            "this is an adaptive film of other regions, and only goes on with those"
+        }
+        _ => return Ok(()),
+    };
+    Err(FileError::content(path, problem).into())
+}
+
 /// A rectangle as `--region` reads it.
 fn rect_text(r: &Rect) -> String {
     format!("{},{},{},{}", r.x0, r.y0, r.x1, r.y1)
@@ -65,7 +84,11 @@ pub fn samples(
     if let Some(range) = &args.samples {
         return Ok(range.clone());
     }
-    Ok(0..end_for(wanted(args, settings)?, regions, held))
+    let wanted = wanted(args, settings)?;
+    if args.adaptive {
+        return Ok(0..wanted);
+    }
+    Ok(0..end_for(wanted, regions, held))
 }
 
 /// Samples that a pixel is to have in all, what a film holds included; [`MAX_SAMPLES`] when time or error
@@ -140,7 +163,8 @@ pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
     } else {
         let wanted = wanted(args, settings)?;
         if wanted < MAX_SAMPLES {
-            conditions.push(count(wanted));
+            let mean = if args.adaptive { " on average" } else { "" };
+            conditions.push(count(wanted) + mean);
         }
     }
     if let Some(error) = args.error {

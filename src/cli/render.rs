@@ -10,6 +10,8 @@ use super::signals::Signals;
 use super::{memory, say};
 use crate::engine::{Counters, DeviceInfo};
 use crate::film::coverage::Rect;
+use crate::film::lock::Lock;
+use crate::film::pilot::Pilot;
 use crate::film::{Film, store};
 use crate::kernel;
 use crate::output::report::{self, Report, Seconds};
@@ -39,6 +41,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let text = parse::read_text(&args.scene)?;
     let scene = parse::parse_str(&args.scene, &text).map_err(Failure::Scene)?;
     let mut settings = Settings::resolve(&scene, &args.overrides());
+    let _lock = args.film.as_deref().map(Lock::new).transpose()?;
     let old = load_film(args)?;
     if let Some((_, provenance)) = &old
         && args.seed.is_none()
@@ -52,11 +55,14 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         (Some((film, held)), Some(path)) => {
             check_same_samples(path, &held, &new)?;
             plan::check_bounds(path, &film, bounds)?;
+            plan::check_adaptive(args, path, &film, &regions)?;
             (film, held)
         }
         _ => {
             memory::check(bounds.area())?;
-            (Film::new(settings.size, bounds, settings.strata), new)
+            let mut film = Film::new(settings.size, bounds, settings.strata);
+            film.pilot = args.adaptive.then(|| Pilot::new(&regions));
+            (film, new)
         }
     };
     let samples = plan::samples(args, &settings, &regions, &film.coverage)?;
@@ -76,6 +82,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         time: args.time,
         error: args.error,
         call: longest_call(args),
+        adaptive: args.adaptive.then_some(settings.seed),
     };
     if let Some(note) = &chosen.note {
         say!("{note}");
@@ -272,6 +279,10 @@ fn say_other_adapters(args: &RenderArgs, held: &Provenance, device: &DeviceInfo)
 fn samples_text(film: &Film) -> String {
     match film.coverage.samples() {
         (a, b) if a == b => plan::count(a),
+        (a, b) if film.pilot.is_some() => format!(
+            "{:.1} samples a pixel on average ({a} to {b})",
+            film.coverage.mean()
+        ),
         (a, b) => format!("{a} to {}", plan::count(b)),
     }
 }

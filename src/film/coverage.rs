@@ -151,6 +151,39 @@ impl Coverage {
         self.cells = new;
     }
 
+    /// Cuts the cells along the edges of `tiles`, disjoint rectangles: samples added to whole tiles then cut no cell.
+    pub fn split(&mut self, tiles: &[Rect]) {
+        let mut cells = Vec::new();
+        for (rect, ranges) in &self.cells {
+            if tiles.contains(rect) {
+                cells.push((*rect, ranges.clone()));
+                continue;
+            }
+            let mut rest = vec![*rect];
+            for part in tiles.iter().filter_map(|t| t.intersection(rect)) {
+                cells.push((part, ranges.clone()));
+                rest = rest.iter().flat_map(|p| p.minus(&part)).collect();
+            }
+            cells.extend(rest.into_iter().map(|r| (r, ranges.clone())));
+        }
+        self.cells = cells;
+    }
+
+    /// Samples of all pixels together.
+    pub fn total(&self) -> u128 {
+        let of = |(rect, ranges): &(Rect, Vec<Range<u64>>)| {
+            let samples: u64 = ranges.iter().map(|r| r.end - r.start).sum();
+            u128::from(rect.area()) * u128::from(samples)
+        };
+        self.cells.iter().map(of).sum()
+    }
+
+    /// Samples of a covered pixel on average; 0 when nothing is covered.
+    pub fn mean(&self) -> f64 {
+        let pixels: u64 = self.cells.iter().map(|(r, _)| r.area()).sum();
+        self.total() as f64 / pixels.max(1) as f64
+    }
+
     /// A pixel rectangle and sample numbers that are already there, if any of the given ones is.
     pub fn overlap(&self, rect: Rect, samples: &Range<u64>) -> Option<(Rect, Range<u64>)> {
         self.cells.iter().find_map(|(r, ranges)| {

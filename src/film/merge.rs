@@ -54,7 +54,7 @@ fn show(rect: &Rect) -> String {
 ///
 /// Where both have samples, their unfinished blocks are folded into the f64 sums; where only one has,
 /// its unfinished block stays as it is, so that a picture put together from regions goes on
-/// with the same bits. That scenes and seeds agree is for the caller to know
+/// with the same bits. What steered adaptive films is dropped: their sum goes on evenly. That scenes and seeds agree is for the caller to know
 /// ([`Provenance::same_samples`](crate::provenance::Provenance::same_samples)).
 pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
     if into.size != other.size {
@@ -91,6 +91,8 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
         }
     }
     into.left_out.merge(&other.left_out);
+    // A sum has no plan that it could go on by.
+    into.pilot = None;
     Ok(())
 }
 

@@ -10,13 +10,16 @@
 pub mod coverage;
 mod heavy_tail;
 mod left_out;
+pub mod lock;
 pub mod merge;
 mod npz;
+pub mod pilot;
 pub mod store;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};
 pub use left_out::LeftOut;
+use pilot::Pilot;
 use std::mem::take;
 use std::ops::Range;
 
@@ -46,6 +49,8 @@ pub struct Film {
     partial: Vec<[Sums<f32>; REPLICATES]>,
     /// Samples that `coverage` has and no sum has.
     left_out: LeftOut,
+    /// What decides where samples go, if that is the picture's noise (`--adaptive`).
+    pub pilot: Option<Pilot>,
 }
 
 /// What a pixel says.
@@ -73,6 +78,7 @@ impl Film {
             sums: vec![Default::default(); pixels],
             partial: Vec::new(),
             left_out: LeftOut::default(),
+            pilot: None,
         }
     }
 
@@ -96,6 +102,7 @@ impl Film {
             sums,
             partial,
             left_out: LeftOut::default(),
+            pilot: None,
         }
     }
 

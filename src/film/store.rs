@@ -14,6 +14,7 @@
 
 use super::coverage::{Coverage, Rect};
 use super::npz::{self, Array, Damage, Reader};
+use super::pilot::Pilot;
 use super::{BLOCK, Film, REPLICATES, Sums};
 use crate::output::atomic;
 use crate::output::error::{FileError, open};
@@ -47,6 +48,9 @@ struct Header {
     /// Rows of the array `left_out`.
     #[serde(default)]
     left_out: u64,
+    /// What steers an adaptive film; only there in one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pilot: Option<Pilot>,
     coverage: Coverage,
     provenance: Provenance,
 }
@@ -72,6 +76,7 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         block: BLOCK,
         partial: unfinished,
         left_out: left_out.len() as u64,
+        pilot: film.pilot.clone(),
         coverage: film.coverage.clone(),
         provenance: provenance.clone(),
     };
@@ -131,6 +136,8 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
 /// What a film's file says of it before its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
+    /// Whether its samples went where the noise is.
+    pub adaptive: bool,
     /// The part of the picture that it holds.
     pub bounds: Rect,
     /// Which pixels have had which samples.
@@ -143,6 +150,7 @@ pub struct Outline {
 pub fn outline(path: &Path) -> Result<Outline, FileError> {
     let header = reading(path, |mut reader| read_header(&mut reader))?;
     Ok(Outline {
+        adaptive: header.pilot.is_some(),
         bounds: header.bounds,
         coverage: header.coverage,
         provenance: header.provenance,
@@ -241,6 +249,7 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
         sums,
         partial,
     );
+    film.pilot = header.pilot;
     for [x, y, samples @ ..] in left_out {
         film.leave_out(x as u32, y as u32, samples);
     }
@@ -284,6 +293,7 @@ fn check_header(header: &Header) -> Result<(), String> {
         strata,
         replicates,
         block,
+        ref pilot,
         ref coverage,
         ref provenance,
         ..
@@ -304,6 +314,9 @@ fn check_header(header: &Header) -> Result<(), String> {
         || !(1..=LARGEST_STRATA).contains(&strata)
     {
         return Err("its size and strata contradict its provenance".into());
+    }
+    if let Some(pilot) = pilot {
+        pilot.check(bounds)?;
     }
     for (rect, ranges) in coverage.cells() {
         if rect.area() == 0 || rect.intersection(&bounds) != Some(rect) {

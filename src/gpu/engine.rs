@@ -462,6 +462,10 @@ impl Engine for GpuEngine {
         Ok(counters)
     }
 
+    fn reseed(&mut self, seed: u32) {
+        self.seed = seed;
+    }
+
     fn device(&self) -> &DeviceInfo {
         &self.gpu.info
     }

@@ -28,7 +28,7 @@ pub struct Report {
     pub regions: Vec<[u32; 4]>,
     /// Seed.
     pub seed: u32,
-    /// Samples of the pixel that has the most, those of earlier runs included.
+    /// Samples of the pixel that has the most, those of earlier runs included; of an adaptive picture the mean.
     pub spp: u64,
     /// Which condition ended the run.
     pub stop_reason: String,
@@ -114,7 +114,10 @@ impl Report {
                 .map(|r| [r.x0, r.y0, r.x1, r.y1])
                 .collect(),
             seed: provenance.settings.seed,
-            spp: film.coverage.samples().1,
+            spp: match film.pilot {
+                Some(_) => film.coverage.mean().round() as u64,
+                None => film.coverage.samples().1,
+            },
             stop_reason: run.stop_reason,
             seconds: run.seconds,
             paths: run.counters.paths,

@@ -151,6 +151,10 @@ impl Engine for CpuEngine {
         Ok(total)
     }
 
+    fn reseed(&mut self, seed: u32) {
+        self.tracer.settings.seed = seed;
+    }
+
     fn device(&self) -> &DeviceInfo {
         &self.device
     }

@@ -227,6 +227,7 @@ fn render(
         time: None,
         error: None,
         call: run::CALL,
+        adaptive: None,
     };
     let mut run = Run::new(&job, engine, film, stop);
     let reason = run.go(|_, _| Ok::<(), crate::engine::EngineError>(()));

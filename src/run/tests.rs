@@ -10,6 +10,10 @@ struct Fake {
     calls: Vec<(Rect, Range<u64>)>,
     nap: Duration,
     fail_at: Option<usize>,
+    seed: u32,
+    /// Whether it goes on with its seed when it is told another.
+    deaf: bool,
+    value: fn(u64) -> f64,
 }
 
 impl Fake {
@@ -24,14 +28,19 @@ impl Fake {
             calls: Vec::new(),
             nap: Duration::ZERO,
             fail_at: None,
+            seed: 0,
+            deaf: false,
+            value: |h| (h >> 40) as f64 / (1u64 << 24) as f64,
         }
     }
 }
 
-/// A value in 0..1 from a pixel and a sample.
-fn noise(x: u32, y: u32, s: u64) -> f64 {
+/// Bits from a seed, a pixel and a sample.
+fn noise(seed: u32, x: u32, y: u32, s: u64) -> u64 {
     let h = (u64::from(x) << 40 ^ u64::from(y) << 20 ^ s).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    ((h ^ (h >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f64 / (1u64 << 24) as f64
+    let h = (h ^ (h >> 29)).wrapping_add(u64::from(seed).wrapping_mul(0x94d0_49bb_1331_11eb));
+    let h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb)
 }
 
 impl Engine for Fake {
@@ -58,7 +67,7 @@ impl Engine for Fake {
             .map(|(x, y)| {
                 let mut sums: [Sums<f64>; REPLICATES] = film.sums()[film.index(x, y)];
                 for s in samples.clone() {
-                    let v = noise(x, y, s);
+                    let v = (self.value)(noise(self.seed, x, y, s));
                     let r = &mut sums[(s / round) as usize % REPLICATES];
                     *r = [r[0] + v, r[1] + v, r[2] + v, r[3] + v * v];
                 }
@@ -75,6 +84,12 @@ impl Engine for Fake {
         })
     }
 
+    fn reseed(&mut self, seed: u32) {
+        if !self.deaf {
+            self.seed = seed;
+        }
+    }
+
     fn device(&self) -> &DeviceInfo {
         &self.device
     }
@@ -88,6 +103,7 @@ fn job(size: [u32; 2], limit: u64, samples: Range<u64>) -> Job {
         time: None,
         error: None,
         call: CALL,
+        adaptive: None,
     }
 }
 
@@ -264,4 +280,88 @@ fn a_stop_flag_is_heeded_between_calls() {
     });
     assert_eq!(reason.unwrap(), StopReason::Interrupted);
     assert!(film.coverage.samples().0 >= 100);
+}
+
+/// Mean light of 200 adaptive pictures, one in a thousand of whose samples holds all of it, and its standard error.
+fn mean_of_adaptive_pictures(deaf: bool) -> (f64, f64) {
+    let size = [64, 64];
+    let mut job = job(size, 4096, 0..64);
+    let mut means = Vec::new();
+    for seed in 0..200 {
+        job.adaptive = Some(seed);
+        let mut engine = Fake::new();
+        (engine.seed, engine.deaf) = (seed, deaf);
+        engine.value = |h| if (h >> 32) % 1000 == 0 { 1000.0 } else { 0.0 };
+        let mut film = Film::new(size, Rect::whole(size), 2);
+        run(&job, &mut engine, &mut film);
+        assert!((film.coverage.mean() - 64.0).abs() < 1.0);
+        let (least, most) = film.coverage.samples();
+        assert!(least < most, "nothing was steered");
+        means.push(film.mean_luminance());
+    }
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+#[test]
+fn adaptive_pictures_are_unbiased_and_would_not_be_if_they_steered_themselves() {
+    let (mean, error) = mean_of_adaptive_pictures(false);
+    assert!((mean - 1.0).abs() < 3.0 * error, "{mean} ± {error}");
+    // With the picture's own first samples for a pilot, tiles that had luck get more samples, and it counts for less.
+    let (biased, error) = mean_of_adaptive_pictures(true);
+    assert!(biased < 1.0 - 3.0 * error, "{biased} ± {error}");
+    println!("unbiased {mean}, steered by itself {biased}, each ± {error}");
+}
+
+/// Where calls are cut, and where a run is left and gone on with, touches no bit.
+#[test]
+fn an_adaptive_film_does_not_depend_on_how_it_was_made() {
+    let size = [80, 48];
+    let picture = |ends: &[u64], call: Duration| {
+        let mut film = Film::new(size, Rect::whole(size), 2);
+        for &end in ends {
+            let mut job = job(size, 2000, 0..end);
+            (job.adaptive, job.call) = (Some(5), call);
+            let mut engine = Fake::new();
+            engine.seed = 5;
+            assert_eq!(run(&job, &mut engine, &mut film), StopReason::Samples);
+        }
+        assert!((film.coverage.mean() - 150.0).abs() < 1.0);
+        film
+    };
+    let once = picture(&[150], CALL);
+    for (ends, call) in [
+        (&[150][..], Duration::from_nanos(1)),
+        (&[7, 33, 50, 64, 149, 150], CALL),
+    ] {
+        let film = picture(ends, call);
+        assert!(
+            film.sums() == once.sums() && film.pilot == once.pilot,
+            "{ends:?}"
+        );
+    }
+}
+
+#[test]
+fn an_adaptive_forecast_grows_to_its_end() {
+    let size = [64, 64];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let mut job = job(size, 4096, 0..100);
+    job.adaptive = Some(0);
+    let mut engine = Fake::new();
+    let stop = AtomicBool::new(false);
+    let mut run = Run::new(&job, &mut engine, &mut film, &stop);
+    let mut fractions = Vec::new();
+    run.go(|_, tally| {
+        let f = tally.forecast.expect("the end is known");
+        assert!(f.left >= 0.0);
+        fractions.push(f.fraction);
+        Ok::<(), EngineError>(())
+    })
+    .unwrap();
+    assert!(fractions.windows(2).all(|f| f[0] <= f[1]));
+    let last = fractions.pop().unwrap();
+    assert!(last > 0.99 && fractions[0] < 0.1, "{last}");
 }

@@ -26,3 +26,57 @@ fn time_and_error_end_a_run() {
         .success()
         .stdout(says("\"stop_reason\": \"spp\""));
 }
+
+/// The first signal's work can last: here on a report to a pipe that nobody reads. A second signal ends it.
+#[cfg(unix)]
+#[test]
+fn a_second_signal_ends_the_process_at_once() {
+    use std::process::{Command, Stdio};
+    use std::thread::sleep;
+    use std::time::{Duration, Instant};
+    let bench = Bench::new();
+    let sh = |script: &str| {
+        let done = Command::new("sh")
+            .args(["-c", script])
+            .current_dir(bench.dir.path())
+            .status();
+        assert!(done.expect("a shell").success(), "{script}");
+    };
+    for [first, second] in [["INT", "TERM"], ["TERM", "INT"]] {
+        sh("rm -f pipe a.png; mkfifo pipe");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
+            .current_dir(bench.dir.path())
+            .args(
+                "render box.toml --backend cpu --quiet --spp 4000000 -o a.png --report pipe"
+                    .split(' '),
+            )
+            .stdin(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        let pid = child.id();
+        // The program opens the pipe once at its start, to see that it can.
+        sh("cat pipe");
+        sleep(Duration::from_millis(500));
+        sh(&format!("kill -{first} {pid}"));
+        let begun = Instant::now();
+        while !bench.path("a.png").exists() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "nothing saved");
+            sleep(Duration::from_millis(20));
+        }
+        sleep(Duration::from_millis(500));
+        assert_eq!(child.try_wait().expect("its state"), None, "it has ended");
+        sh(&format!("kill -{second} {pid}"));
+        let status = loop {
+            if let Some(status) = child.try_wait().expect("its state") {
+                break status;
+            }
+            if begun.elapsed() > Duration::from_secs(60) {
+                child.kill().expect("it can be killed");
+                panic!("the second signal did not end it");
+            }
+            sleep(Duration::from_millis(20));
+        };
+        let expected = if second == "INT" { 130 } else { 143 };
+        assert_eq!(status.code(), Some(expected), "{first}, then {second}");
+    }
+}

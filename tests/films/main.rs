@@ -1,9 +1,11 @@
 //! Films and the program, seen from outside.
 
+mod adaptive;
 mod cost;
 mod damage;
 #[cfg(target_os = "linux")]
 mod kill;
+mod lock;
 mod merge;
 mod progress;
 mod resume;

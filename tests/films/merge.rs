@@ -176,6 +176,13 @@ fn merging_holds_fewer_than_three_films() {
 
 #[cfg(target_os = "linux")]
 #[test]
+fn merging_more_films_takes_no_more_memory() {
+    let [few, many] = [3, 16].map(|n| peak_in_films(&Bench::new(), [480, 270], n));
+    assert!(few > 1.0 && many < few + 0.5, "{few} and {many} films");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
 #[ignore = "18 GB of films: cargo test --release --test films -- --ignored --nocapture full_hd"]
 fn merging_64_full_hd_films_holds_fewer_than_three() {
     let films = peak_in_films(&Bench::new(), [1920, 1080], 64);
