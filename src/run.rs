@@ -124,14 +124,23 @@ fn columns(r: Rect) -> impl Iterator<Item = Rect> {
     })
 }
 
-/// The first sample count after `count` at which the error is looked at: whole numbers of rounds of all replicates,
-/// spaced by a factor, from [`MIN_CHECKED_SAMPLES`].
-fn next_check(count: u64, job: &Job) -> u64 {
-    let period = job.round * REPLICATES as u64;
-    let (first, factor) = match job.error {
-        Some(_) => (MIN_CHECKED_SAMPLES, CHECK_FACTOR),
-        None => (MIN_SHOWN_SAMPLES, SHOWN_CHECK_FACTOR),
-    };
+/// The first sample count after `count` at which the error may end a run: whole numbers of rounds of all replicates,
+/// spaced by [`CHECK_FACTOR`], from [`MIN_CHECKED_SAMPLES`].
+fn next_check(count: u64, round: u64) -> u64 {
+    spaced(count, round, MIN_CHECKED_SAMPLES, CHECK_FACTOR)
+}
+
+/// The first sample count after `count` at which a job looks at the error.
+fn next_look(count: u64, job: &Job) -> u64 {
+    match job.error {
+        Some(_) => next_check(count, job.round),
+        None => spaced(count, job.round, MIN_SHOWN_SAMPLES, SHOWN_CHECK_FACTOR),
+    }
+}
+
+/// The first count after `count` in a sequence of whole numbers of rounds of all replicates, spaced by `factor`.
+fn spaced(count: u64, round: u64, first: u64, factor: f64) -> u64 {
+    let period = round * REPLICATES as u64;
     let mut check = first.div_ceil(period) * period;
     while check <= count {
         let next = (check as f64 * factor).ceil() as u64;
@@ -204,14 +213,14 @@ impl<'a> Run<'a> {
         'passes: loop {
             at = first_missing(&self.film.coverage, job, at);
             let count = at - job.samples.start;
-            let check = next_check(count.saturating_sub(1), job);
+            let check = next_look(count.saturating_sub(1), job);
             if count == check && self.enough(count) {
                 return Ok(StopReason::Error);
             }
             if at >= job.samples.end {
                 return Ok(StopReason::Samples);
             }
-            let next = next_check(count, job);
+            let next = next_look(count, job);
             let end = self.pass_end(at).min(job.samples.start + next);
             let learning = self.pace.is_none();
             for tile in &job.tiles {
@@ -326,7 +335,7 @@ impl<'a> Run<'a> {
             // The error falls with the square root of the samples, and is next looked at then or later.
             (Some(target), Some((count, error))) => {
                 let reached = count as f64 * (error / target).powi(2);
-                let check = next_check((reached as u64).max(count), job);
+                let check = next_look((reached as u64).max(count), job);
                 needed = needed.min(check as f64);
             }
             (Some(_), None) if job.time.is_none() => return None,

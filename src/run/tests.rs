@@ -224,17 +224,17 @@ fn forecasts_of_the_error_come_true() {
 fn checks_are_whole_rounds_of_all_replicates() {
     let mut job = job([1, 1], 1, 0..1 << 20);
     let checks = |job: &Job| {
-        let after = |count: &u64| Some(next_check(*count, job));
-        let counts = std::iter::successors(Some(next_check(0, job)), after);
+        let after = |count: &u64| Some(next_look(*count, job));
+        let counts = std::iter::successors(Some(next_look(0, job)), after);
         counts.take(6).collect::<Vec<_>>()
     };
     assert_eq!(checks(&job), [64, 256, 1024, 4096, 16384, 65536]);
     job.error = Some(0.1);
     assert_eq!(checks(&job), [16, 32, 48, 64, 80, 112]);
     job.round = 1;
-    assert_eq!(next_check(0, &job), 16);
+    assert_eq!(next_look(0, &job), 16);
     job.round = 9;
-    assert_eq!(next_check(0, &job), 36);
+    assert_eq!(next_look(0, &job), 36);
 }
 
 #[test]
