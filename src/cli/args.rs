@@ -1,5 +1,6 @@
 //! The command line as clap reads it.
 
+use super::bench::args::BenchArgs;
 use super::values;
 use crate::compare::DEFAULT_ALPHA;
 use crate::film::BLOCK;
@@ -45,6 +46,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Render every scene of a folder and compare it with its golden picture
     Regress(RegressArgs),
+    /// Measure speed against error
+    Bench(Box<BenchArgs>),
     /// List the adapters, which one would be taken, and why not the others
     Adapters,
     /// Print the JSON Schema of scene files
