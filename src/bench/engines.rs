@@ -78,8 +78,26 @@ pub struct Contender {
 
 enum Either {
     Gpu(Box<GpuEngine>),
-    /// It has no other way to another seed than to be made anew.
-    Cpu(World, Settings, Estimator, Box<CpuEngine>),
+    Cpu(Box<Cpu>),
+}
+
+/// The reference, and what it is made of: it has no other way to another seed than to be made anew.
+struct Cpu {
+    world: World,
+    settings: Settings,
+    estimator: Estimator,
+    engine: CpuEngine,
+}
+
+impl Cpu {
+    fn new(world: World, settings: Settings, estimator: Estimator) -> Self {
+        Self {
+            engine: CpuEngine::new(world.clone(), settings.clone(), estimator),
+            world,
+            settings,
+            estimator,
+        }
+    }
 }
 
 impl Contender {
@@ -92,27 +110,25 @@ impl Contender {
         settings: &Settings,
         stop: &AtomicBool,
     ) -> Result<Self, Unready> {
-        let access = match kind {
-            EngineKind::GpuBaked => Access::Baked,
-            _ => Access::Buffers,
-        };
         let (engine, compile_seconds, tile_pixels) = match kind {
             EngineKind::GpuBaked | EngineKind::GpuBuffers => {
                 let gpu = gpu.ok_or_else(|| GpuError::NoAdapter("no Vulkan adapter".into()))?;
+                let access = match kind {
+                    EngineKind::GpuBaked => Access::Baked,
+                    _ => Access::Buffers,
+                };
                 let engine = GpuEngine::on(Arc::clone(gpu), world, settings, Some(access))?;
                 let seconds = engine.compile_seconds();
                 (Either::Gpu(Box::new(engine)), seconds, MAX_TILE_PIXELS)
             }
-            EngineKind::Cpu => (
-                cpu(world, settings, Estimator::LightSampling),
-                0.0,
-                CPU_TILE_PIXELS,
-            ),
-            EngineKind::CpuBrute => (
-                cpu(world, settings, Estimator::NoLightSampling),
-                0.0,
-                CPU_TILE_PIXELS,
-            ),
+            EngineKind::Cpu | EngineKind::CpuBrute => {
+                let estimator = match kind {
+                    EngineKind::Cpu => Estimator::LightSampling,
+                    _ => Estimator::NoLightSampling,
+                };
+                let cpu = Cpu::new(world.clone(), settings.clone(), estimator);
+                (Either::Cpu(Box::new(cpu)), 0.0, CPU_TILE_PIXELS)
+            }
         };
         let whole = Rect::whole(settings.size);
         let mut contender = Self {
@@ -135,7 +151,7 @@ impl Contender {
     pub fn engine_mut(&mut self) -> &mut dyn Engine {
         match &mut self.engine {
             Either::Gpu(engine) => engine.as_mut(),
-            Either::Cpu(.., engine) => engine.as_mut(),
+            Either::Cpu(cpu) => &mut cpu.engine,
         }
     }
 
@@ -143,7 +159,7 @@ impl Contender {
     pub fn device(&self) -> &DeviceInfo {
         match &self.engine {
             Either::Gpu(engine) => engine.device(),
-            Either::Cpu(.., engine) => engine.device(),
+            Either::Cpu(cpu) => cpu.engine.device(),
         }
     }
 
@@ -151,7 +167,7 @@ impl Contender {
     pub fn read_back_seconds(&self) -> f64 {
         match &self.engine {
             Either::Gpu(engine) => engine.read_back_seconds(),
-            Either::Cpu(..) => 0.0,
+            Either::Cpu(_) => 0.0,
         }
     }
 
@@ -159,9 +175,12 @@ impl Contender {
     pub fn reseed(&mut self, seed: u32) {
         match &mut self.engine {
             Either::Gpu(engine) => engine.reseed(seed),
-            Either::Cpu(world, settings, estimator, engine) => {
-                settings.seed = seed;
-                **engine = CpuEngine::new(world.clone(), settings.clone(), *estimator);
+            Either::Cpu(cpu) => {
+                let settings = Settings {
+                    seed,
+                    ..cpu.settings.clone()
+                };
+                **cpu = Cpu::new(cpu.world.clone(), settings, cpu.estimator);
             }
         }
     }
@@ -169,27 +188,21 @@ impl Contender {
     /// What fixes the values of its samples beside scene, settings and seed: kernel, adapter and driver, or the
     /// reference's own version.
     pub fn identity(&self) -> String {
-        let made_by = match &self.engine {
+        let made_by: String = match &self.engine {
             Either::Gpu(engine) => {
                 let hash = Sha256::digest(&engine.kernel().wgsl);
                 hash[..8].iter().map(|b| format!("{b:02x}")).collect()
             }
-            Either::Cpu(..) => env!("CARGO_PKG_VERSION").to_owned(),
+            Either::Cpu(_) => env!("CARGO_PKG_VERSION").to_owned(),
         };
         let device = self.device();
-        // How many threads the reference has is no matter.
-        let driver = if self.kind.on_gpu() {
-            &device.driver
-        } else {
-            ""
-        };
-        format!("{}; {}; {driver}; {made_by}", self.kind.name(), device.name)
+        let mut parts = vec![self.kind.name(), &device.name, &device.driver, &made_by];
+        if !self.kind.on_gpu() {
+            // How many threads the reference has is no matter.
+            parts.remove(2);
+        }
+        parts.join("; ")
     }
-}
-
-fn cpu(world: &World, settings: &Settings, estimator: Estimator) -> Either {
-    let engine = CpuEngine::new(world.clone(), settings.clone(), estimator);
-    Either::Cpu(world.clone(), settings.clone(), estimator, Box::new(engine))
 }
 
 /// Why an engine is not ready.

@@ -78,12 +78,12 @@ pub fn measure(
             break;
         }
         for &seed in &plan.seeds {
-            for i in 0..contenders.len() {
+            for (i, contender) in contenders.iter_mut().enumerate() {
                 if spent[i].over {
                     continue;
                 }
                 let before: f64 = spent.iter().map(|s| s.counted(limit)).sum();
-                let engine = contenders[i].kind;
+                let engine = contender.kind;
                 let show = |tally: &Tally| {
                     show(Standing {
                         fraction: ((before + tally.seconds) / all).min(1.0),
@@ -91,7 +91,6 @@ pub fn measure(
                         samples,
                     });
                 };
-                let contender = &mut contenders[i];
                 let Some(one) = picture(contender, truth, settings, seed, samples, stop, show)?
                 else {
                     return Ok(false);

@@ -35,7 +35,7 @@ pub struct BenchArgs {
     pub scenes: Vec<PathBuf>,
     /// Engines, by commas or repeated: gpu-baked (scene values in the kernel's text), gpu-buffers, cpu (the f64
     /// reference), cpu-brute (the same without light sampling); ratios are to the first
-    /// [default: what render would take, and cpu]
+    /// [default: what render would take, and without --report-table cpu]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = engine)]
     pub engine: Vec<EngineKind>,
     /// Rendering time of each engine and scene, over all its pictures; its pictures of one sample are made whatever they

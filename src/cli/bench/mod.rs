@@ -44,11 +44,9 @@ pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
     // Scenes with errors are refused before any is measured.
-    let scenes: Vec<Scene> = args
-        .scenes
-        .iter()
-        .map(|path| Ok(parse::parse_str(path, &parse::read_text(path)?).map_err(Failure::Scene)?))
-        .collect::<Result<_, Failure>>()?;
+    let read =
+        |path: &PathBuf| parse::parse_str(path, &parse::read_text(path)?).map_err(Failure::Scene);
+    let scenes: Vec<Scene> = args.scenes.iter().map(read).collect::<Result<_, _>>()?;
     let gpu = open(args)?;
     let mut bench = Bench {
         args,
@@ -205,8 +203,11 @@ impl Bench<'_> {
                 .gpu
                 .as_ref()
                 .map(|gpu| EngineKind::with_access(Access::choose_for(world, gpu.info())));
-            kinds.extend(usual);
-            kinds.push(EngineKind::Cpu);
+            // Beside it the reference, for a ratio; it is slow for the report's table.
+            if usual.is_none() || !self.args.report_table {
+                kinds.push(EngineKind::Cpu);
+            }
+            kinds.splice(0..0, usual);
         }
         let mut once: Vec<EngineKind> = Vec::new();
         for kind in kinds {
