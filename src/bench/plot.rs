@@ -6,6 +6,7 @@ use crate::output::{FileError, atomic};
 use plotters::backend::{BitMapBackend, SVGBackend};
 use plotters::chart::{ChartBuilder, SeriesLabelPosition};
 use plotters::coord::Shift;
+use plotters::coord::combinators::BindKeyPoints;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind, IntoDrawingArea};
 use plotters::element::{Circle, Cross, PathElement, TriangleMarker};
 use plotters::prelude::{Color, DrawingBackend, IntoLogRange, RGBColor, ShapeStyle};
@@ -222,27 +223,27 @@ fn draw_panel<DB: DrawingBackend>(
         .caption(&panel.title, font(17.0))
         .x_label_area_size(px(48.0) as u32)
         .y_label_area_size(px(62.0) as u32)
-        .build_cartesian_2d((x0..x1).log_scale(), (y0..y1).log_scale())?;
+        .build_cartesian_2d(
+            (x0..x1).log_scale().with_key_points(ticks(x0, x1)),
+            (y0..y1).log_scale().with_key_points(ticks(y0, y1)),
+        )?;
     chart
         .configure_mesh()
         .x_desc("seconds")
         .y_desc("relative error")
-        .x_labels(12)
-        .y_labels(12)
         .x_label_formatter(&|x| plain(*x))
         .y_label_formatter(&|y| format!("{} %", plain(*y * 100.0)))
         .label_style(font(14.0))
         .axis_desc_style(font(15.0))
         .axis_style(line(BLACK, 1.0))
         .bold_line_style(line(RGBColor(215, 215, 215), 0.7))
-        .light_line_style(line(RGBColor(240, 240, 240), 0.5))
         .set_all_tick_mark_size(px(4.0) as u32)
         .draw()?;
 
-    // The guide lies below the first curve, so that it hides nothing.
-    let first = panel.curves.iter().find_map(|c| c.points.first());
-    if let Some([x, y, _]) = first {
-        let guide = |t: f64| (t, 0.75 * y * (t / x).powf(-0.5));
+    // The guide lies below the end of the first curve, where costs besides the samples matter least.
+    let last = panel.curves.iter().find_map(|c| c.points.last());
+    if let Some([x, y, _]) = last {
+        let guide = |t: f64| (t, 0.7 * y * (t / x).powf(-0.5));
         let ends = [x0, x1].map(guide);
         let dashes = DashedLineSeries::new(ends, px(6.0) as u32, px(4.0) as u32, line(GREY, 1.2));
         chart
@@ -306,13 +307,26 @@ fn draw_panel<DB: DrawingBackend>(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperRight)
+        .position(SeriesLabelPosition::LowerLeft)
         .margin(px(8.0) as i32)
         .legend_area_size(px(18.0) as u32)
         .label_font(TextStyle::from(font(14.0)).pos(Pos::new(HPos::Left, VPos::Top)))
-        .background_style(WHITE.mix(0.9))
-        .border_style(line(RGBColor(190, 190, 190), 0.7))
+        .background_style(WHITE.mix(0.85))
         .draw()
+}
+
+/// Where an axis is labelled: powers of ten, with more between them where there would be few.
+fn ticks(low: f64, high: f64) -> Vec<f64> {
+    let steps: &[f64] = match (high / low).log10() {
+        decades if decades > 2.5 => &[1.0],
+        decades if decades > 1.0 => &[1.0, 2.0, 5.0],
+        _ => &[1.0, 2.0, 3.0, 4.0, 6.0, 8.0],
+    };
+    let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
+    decades
+        .flat_map(|k| steps.iter().map(move |s| s * 10f64.powi(k)))
+        .filter(|t| (low..=high).contains(t))
+        .collect()
 }
 
 /// A number without digits that say nothing.
@@ -404,6 +418,13 @@ mod tests {
         };
         assert!(svg(&[empty]).is_ok());
         assert!(svg(&[]).is_ok());
+    }
+
+    #[test]
+    fn axes_have_neither_few_nor_many_labels() {
+        assert_eq!(ticks(0.9, 2000.0), [1.0, 10.0, 100.0, 1000.0]);
+        assert_eq!(ticks(0.9, 30.0), [1.0, 2.0, 5.0, 10.0, 20.0]);
+        assert_eq!(ticks(2.2, 4.4), [3.0, 4.0], "as narrow as an axis gets");
     }
 
     #[test]

@@ -63,6 +63,8 @@ pub struct Point {
     pub rays_per_path: Spread,
     /// See [`Errors::mse`](super::Errors::mse).
     pub mse: Spread,
+    /// What the pictures state of it; `None` while they state nothing.
+    pub claimed_mse: Option<Spread>,
     /// See [`Errors::relative_mse`](super::Errors::relative_mse).
     pub relative_mse: Spread,
     /// See [`Errors::trimmed_relative_mse`](super::Errors::trimmed_relative_mse).
@@ -71,7 +73,8 @@ pub struct Point {
     pub flip: Spread,
     /// √ of the relative MSE; `None` where it is not positive for some seed.
     pub true_relative_error: Option<Spread>,
-    /// What the pictures state; `None` while they state nothing.
+    /// What the pictures state of it. Where light comes in rare bright samples that is less: pixels that had one state a
+    /// large error beside a luminance that is too large. The claimed MSE has no such weights.
     pub claimed_relative_error: Option<Spread>,
     /// 1 / (mean MSE × mean seconds), with the spread of single seeds; `None` where the MSE is not positive.
     pub efficiency: Option<Spread>,
@@ -143,6 +146,7 @@ fn point(group: &[&Measurement]) -> Option<Point> {
         rays_per_second: spread(&|m| m.counters.rays as f64 / m.seconds)?,
         rays_per_path: spread(&|m| m.counters.rays as f64 / m.counters.paths as f64)?,
         mse,
+        claimed_mse: positive(&|m| m.errors.claimed_mse),
         relative_mse: spread(&|m| m.errors.relative_mse)?,
         trimmed_relative_mse: spread(&|m| m.errors.trimmed_relative_mse)?,
         flip: spread(&|m| m.errors.flip)?,

@@ -4,7 +4,7 @@ use super::figure9::{Cell, RAYS};
 use super::summary::{Spread, millions, slope};
 use super::{EngineKind, Point, Results};
 
-/// Columns of text, the first one aligned left, the others right.
+/// Columns of text, the first one aligned left, the others right; but what stands under `on` is left too.
 struct Columns(Vec<Vec<String>>);
 
 impl Columns {
@@ -24,6 +24,7 @@ impl Columns {
             for (c, (cell, &w)) in row.iter().zip(&widths).enumerate() {
                 line += &match c {
                     0 => format!("{cell:w$}"),
+                    _ if self.0[0][c] == "on" => format!("  {cell}"),
                     _ => format!("  {cell:>w$}"),
                 };
             }
@@ -49,7 +50,7 @@ pub fn text(results: &Results) -> String {
     text += &format!("\n{}", engines(results));
     text += &format!("\n{}", speed(&points));
     text += &format!("\n{}", errors(&points));
-    text
+    text + &reference_note(results, &points)
 }
 
 fn reference(results: &Results) -> String {
@@ -69,6 +70,25 @@ fn reference(results: &Results) -> String {
         _ => String::new(),
     };
     format!("reference: {}{samples}{noise}{kept}\n", r.about)
+}
+
+/// A reference whose stated relative error is more than this share of a picture's error is called short.
+const SHORT: f64 = 0.5;
+
+/// A warning where pictures come near the reference: its noise is subtracted, but a relative error also rests on its
+/// luminances, and FLIP has no correction.
+fn reference_note(results: &Results, points: &[Point]) -> String {
+    let errors = points.iter().filter_map(|p| p.true_relative_error);
+    let least = errors.map(|e| e.mean).fold(f64::INFINITY, f64::min);
+    match results.reference.truth.noise_floor() {
+        Some(noise) if noise > SHORT * least => format!(
+            "note: the reference's relative error, {}, is near the least one here, {}; more --reference-spp would tell \
+             better\n",
+            percent(noise),
+            percent(least)
+        ),
+        _ => String::new(),
+    }
 }
 
 fn engines(results: &Results) -> String {
@@ -118,11 +138,12 @@ fn errors(points: &[Point]) -> String {
         "engine",
         "samples",
         "MSE",
+        "claimed MSE",
         "relative MSE",
         "trimmed",
         "FLIP",
         "error",
-        "claimed",
+        "claimed error",
         "efficiency",
         "ratio",
     ]);
@@ -132,6 +153,7 @@ fn errors(points: &[Point]) -> String {
             p.engine.name().into(),
             p.samples.to_string(),
             cell(p.mse),
+            p.claimed_mse.map_or("-".into(), cell),
             cell(p.relative_mse),
             cell(p.trimmed_relative_mse),
             cell(p.flip),

@@ -160,6 +160,7 @@ fn json_lines_carry_what_was_measured() {
         "rays_per_path",
         "mean_path_length",
         "mse",
+        "claimed_mse",
         "relative_mse",
         "trimmed_relative_mse",
         "flip",
@@ -267,7 +268,7 @@ fn the_report_table_leaves_blank_what_takes_too_long() {
 #[test]
 fn an_interrupted_bench_shows_what_there_is() {
     let bench = Bench::new();
-    let script = "timeout --preserve-status -s INT 4 \"$0\" bench box.toml --engine cpu --seeds 2 --size 12x8 \
+    let script = "timeout --foreground --preserve-status -s INT 4 \"$0\" bench box.toml --engine cpu --seeds 2 --size 12x8 \
                   --time 1h --reference-spp 64 --cache cache --json a.jsonl --progress none > table";
     assert_eq!(bench.shell(&[], script), 130);
     let table = fs::read_to_string(bench.path("table")).unwrap();
