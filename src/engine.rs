@@ -8,6 +8,16 @@ use std::sync::atomic::AtomicBool;
 /// The most pixels an engine is given at once; larger pictures are tiled.
 pub const MAX_TILE_PIXELS: u64 = 1 << 20;
 
+/// The most pixels to give an engine on this device at once. The CPU reference: a sample of each takes a fraction of a second.
+/// A software adapter: in a call's time it takes many samples of each, and its lanes wait less for each other's longer paths.
+pub fn tile_pixels(device: &DeviceInfo) -> u64 {
+    match (device.backend.as_str(), device.software) {
+        ("cpu", _) => 1 << 16,
+        (_, true) => 1 << 14,
+        _ => MAX_TILE_PIXELS,
+    }
+}
+
 /// Makes samples.
 pub trait Engine {
     /// Adds the samples numbered `samples` of every pixel of `rect` to `film`.

@@ -7,6 +7,7 @@
 //!
 //! The CPU [`reference`] takes the same [`world::World`] and gives the same [`film::Film`].
 
+pub mod bench;
 pub mod cli;
 pub mod compare;
 pub mod engine;

@@ -1,5 +1,6 @@
 //! The command line as clap reads it.
 
+use super::bench::args::BenchArgs;
 use super::values;
 use crate::compare::DEFAULT_ALPHA;
 use crate::film::BLOCK;
@@ -47,6 +48,8 @@ pub enum Command {
     Regress(RegressArgs),
     /// Write a scene of many spheres or many lights
     MakeScene(MakeSceneArgs),
+    /// Measure speed against error
+    Bench(Box<BenchArgs>),
     /// List the adapters, which one would be taken, and why not the others
     Adapters,
     /// Print the JSON Schema of scene files

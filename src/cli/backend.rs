@@ -2,7 +2,7 @@
 
 use super::args::Backend;
 use super::failure::Failure;
-use crate::engine::{Engine, MAX_TILE_PIXELS};
+use crate::engine::{Engine, tile_pixels};
 use crate::gpu::{self, Gpu, GpuEngine, GpuError};
 use crate::kernel::Access;
 use crate::reference::{CpuEngine, Estimator};
@@ -11,13 +11,6 @@ use crate::world::World;
 
 /// How to come by an adapter, for those who have none.
 pub const GET_ADAPTER: &str = "apt-get install mesa-vulkan-drivers";
-
-/// Pixels that the CPU reference is given at once: a sample of each takes a fraction of a second.
-const CPU_TILE_PIXELS: u64 = 1 << 16;
-
-/// Pixels that a software adapter is given at once: in a call's time it takes many samples of each, and its lanes wait
-/// less for each other's longer paths.
-const SOFTWARE_TILE_PIXELS: u64 = 1 << 14;
 
 /// An engine, and what the renderer must know about it.
 pub struct Chosen {
@@ -53,11 +46,7 @@ pub fn choose(
             compile_seconds: engine.compile_seconds(),
             wgsl: Some(engine.kernel().wgsl.clone()),
             access: Some(engine.kernel().access),
-            tile_pixels: if engine.device().software {
-                SOFTWARE_TILE_PIXELS
-            } else {
-                MAX_TILE_PIXELS
-            },
+            tile_pixels: tile_pixels(engine.device()),
             engine: Box::new(engine),
             note: None,
         }),
@@ -119,7 +108,7 @@ fn cpu(world: &World, settings: &Settings, note: Option<String>) -> Chosen {
         compile_seconds: 0.0,
         wgsl: None,
         access: None,
-        tile_pixels: CPU_TILE_PIXELS,
+        tile_pixels: tile_pixels(&CpuEngine::device_info()),
         note,
     }
 }

@@ -3,6 +3,7 @@
 mod adapters;
 mod args;
 mod backend;
+mod bench;
 mod check;
 mod compare;
 mod develop;
@@ -59,6 +60,7 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::compare(&args),
         Command::Regress(args) => regress::regress(&args),
         Command::MakeScene(args) => make_scene::make_scene(&args),
+        Command::Bench(args) => bench::bench(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
     };
@@ -93,6 +95,7 @@ fn prepare_environment(command: &Command) {
     let talk = match command {
         Command::Render(args) => Some(args.talk),
         Command::Selftest(args) => Some(args.talk),
+        Command::Bench(args) => Some(args.talk),
         _ => None,
     };
     if let Some(threads) = talk.and_then(|t| t.threads) {

@@ -72,6 +72,22 @@ impl Progress {
         }
     }
 
+    /// Shows the share of the work that is done, and what is being done.
+    pub fn share(&mut self, fraction: f64, text: &str) {
+        match self {
+            Progress::Silent => {}
+            Progress::Lines(last) if last.elapsed() < LINE_EVERY => {}
+            Progress::Lines(last) => {
+                *last = Instant::now();
+                super::say!("{text}, {:.0} %", (fraction * 100.0).floor().min(99.0));
+            }
+            Progress::Bar(bar) => {
+                bar.set_position(((fraction * STEPS as f64) as u64).min(STEPS - 1));
+                bar.set_message(text.to_owned());
+            }
+        }
+    }
+
     /// Does something that writes to the terminal without tearing the bar.
     pub fn aside<T>(&self, f: impl FnOnce() -> T) -> T {
         match self {

@@ -39,6 +39,7 @@ pub struct GpuEngine {
     /// Seconds that one sample of one pixel takes, as measured so far.
     seconds_per_path: Option<f64>,
     compile_seconds: f64,
+    read_back_seconds: f64,
 }
 
 /// Running sums that lie in a tile's textures.
@@ -181,6 +182,7 @@ impl GpuEngine {
             seed: settings.seed,
             seconds_per_path: None,
             compile_seconds: 0.0,
+            read_back_seconds: 0.0,
             gpu,
         };
         engine.warm_up().map_err(|problem| GpuError::Unable {
@@ -194,6 +196,11 @@ impl GpuEngine {
     /// Seconds from the opened device to the compiled kernel.
     pub fn compile_seconds(&self) -> f64 {
         self.compile_seconds
+    }
+
+    /// Seconds spent so far on reading back what dispatches left, and on folding it into films.
+    pub fn read_back_seconds(&self) -> f64 {
+        self.read_back_seconds
     }
 
     /// The kernel.
@@ -415,9 +422,11 @@ impl GpuEngine {
             .tile
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
+        let begun = Instant::now();
         let counters = tile
             .download(&self.gpu, place, &mut running)
             .map_err(device_error)?;
+        self.read_back_seconds += begun.elapsed().as_secs_f64();
         self.held = Some(Held {
             rect,
             place,
@@ -436,6 +445,7 @@ impl Engine for GpuEngine {
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError> {
         let counted = self.render_tile(film, rect, samples.clone(), stop)?;
+        let begun = Instant::now();
         let held = self.held.as_ref().map_or(&[][..], |h| &h.running);
         let mut counters = Counters {
             paths: rect.area() * (samples.end - samples.start),
@@ -459,6 +469,7 @@ impl Engine for GpuEngine {
         film.put_block(rect, samples, |x, y| {
             held[(y - rect.y0) as usize * width + (x - rect.x0) as usize]
         });
+        self.read_back_seconds += begun.elapsed().as_secs_f64();
         Ok(counters)
     }
 

@@ -5,6 +5,7 @@
 #[path = "../program/mod.rs"]
 mod program;
 
+mod bench;
 mod bits;
 mod said;
 mod selftest;
