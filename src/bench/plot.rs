@@ -393,10 +393,9 @@ mod tests {
         }
         let png = dir.join("plot.png");
         write(&png, Format::Png, &panels).unwrap();
-        let mut reader =
-            png::Decoder::new(std::io::BufReader::new(std::fs::File::open(&png).unwrap()))
-                .read_info()
-                .unwrap();
+        let mut reader = png::Decoder::new(std::io::BufReader::new(fs::File::open(&png).unwrap()))
+            .read_info()
+            .unwrap();
         let mut data = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut data).unwrap();
         assert_eq!([info.width, info.height], [2 * 560 * 2, 440 * 2]);

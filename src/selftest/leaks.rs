@@ -158,9 +158,9 @@ fn outside_a_box(b: &Backend) -> Result<Vec<Measure>, Trouble> {
 }
 
 fn inside_a_cylinder(b: &Backend) -> Result<Vec<Measure>, Trouble> {
-    // The horizon is out of view: f32 directions cannot aim at a thing from ten million of its sizes away.
+    // A floor without horizon: f32 directions cannot aim at a thing from ten million of its sizes away.
     let build = Build::new(v(0.0, 2.5, 3.0), v(0.0, 0.3, 0.0), 40.0)
-        .add(plane(DVec3::ZERO, DVec3::Y), grey(0.9))
+        .add(disk(DVec3::ZERO, DVec3::Y, 100.0), grey(0.9))
         .add(cylinder(DVec3::ZERO, v(0.0, 1.0, 0.0), 0.5), grey(0.9))
         .add(cylinder(v(0.9, 0.5, 0.3), v(1.4, 0.9, 0.1), 0.3), grey(0.9))
         // Close to caps and side.
