@@ -16,8 +16,11 @@ const REFERENCE_SAMPLES: u64 = 8192;
 
 /// Mean and squared standard error of every pixel and channel.
 fn pixels(film: &Film) -> Vec<(f64, f64)> {
-    let mut out = Vec::new();
-    film.for_each(|_, _, e| out.extend((0..3).map(|c| (e.mean[c], e.error[c].powi(2)))));
+    let mut out = vec![(0.0, 0.0); 3 * film.sums().len()];
+    film.for_each(|x, y, e| {
+        let at = 3 * film.index(x, y);
+        (0..3).for_each(|c| out[at + c] = (e.mean[c], e.error[c].powi(2)));
+    });
     out
 }
 
