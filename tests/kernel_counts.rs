@@ -131,7 +131,7 @@ fn in_buffer(module: &Module, f: &Function, mut pointer: Handle<Expression>) -> 
     loop {
         match f.expressions[pointer] {
             Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => {
-                pointer = base
+                pointer = base;
             }
             Expression::GlobalVariable(global) => {
                 return matches!(

@@ -393,7 +393,7 @@ mod tests {
         }
         let png = dir.join("plot.png");
         write(&png, Format::Png, &panels).unwrap();
-        let mut reader = png::Decoder::new(std::io::BufReader::new(fs::File::open(&png).unwrap()))
+        let mut reader = png::Decoder::new(io::BufReader::new(std::fs::File::open(&png).unwrap()))
             .read_info()
             .unwrap();
         let mut data = vec![0; reader.output_buffer_size().unwrap()];

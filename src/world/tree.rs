@@ -207,7 +207,7 @@ impl Tree {
         let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut nodes = Vec::with_capacity((2 * boxes.len()).saturating_sub(1));
         // What is still to be written; the second part of a node waits until the first is complete.
-        let mut open = Vec::from([0..items.len()]);
+        let mut open: Vec<_> = std::iter::once(0..items.len()).collect();
         while let Some(range) = open.pop() {
             let these = &mut items[range.clone()];
             if these.is_empty() {
