@@ -126,15 +126,18 @@ fn range(values: impl Iterator<Item = f64>, room: [f64; 2]) -> [f64; 2] {
 
 /// Writes a picture of the panels, side by side.
 pub fn write(path: &Path, format: Format, panels: &[Panel]) -> Result<(), FileError> {
-    // Without a font of our own, text in a PNG would depend on what fonts the system has.
-    let font = epaint_default_fonts::UBUNTU_LIGHT;
-    register_font("sans-serif", FontStyle::Normal, font)
-        .map_err(|_| FileError::content(path, "the plot's font is damaged"))?;
     let bytes = match format {
         Format::Svg => svg(panels),
         Format::Png => png(panels),
     };
     atomic::replace(path, |f| f.write_all(&bytes?))
+}
+
+/// Without a font of our own, text in a PNG would depend on what fonts the system has.
+fn use_own_font() -> io::Result<()> {
+    let font = epaint_default_fonts::UBUNTU_LIGHT;
+    register_font("sans-serif", FontStyle::Normal, font)
+        .map_err(|_| io::Error::other("the plot's font is damaged"))
 }
 
 /// Columns and rows of panels.
@@ -144,6 +147,7 @@ fn grid(panels: usize) -> [u32; 2] {
 }
 
 fn svg(panels: &[Panel]) -> io::Result<Vec<u8>> {
+    use_own_font()?;
     let [columns, rows] = grid(panels.len());
     let mut text = String::new();
     {
@@ -154,6 +158,7 @@ fn svg(panels: &[Panel]) -> io::Result<Vec<u8>> {
 }
 
 fn png(panels: &[Panel]) -> io::Result<Vec<u8>> {
+    use_own_font()?;
     let [columns, rows] = grid(panels.len());
     let size = [columns * PANEL[0] * PIXELS, rows * PANEL[1] * PIXELS];
     let [w, h] = size.map(|n| (n * SMOOTHING) as usize);

@@ -33,7 +33,7 @@ fn bench_refuses_what_it_cannot_do() {
     for (args, rule) in [
         (
             "box.toml --engine tpu",
-            "gpu-baked, gpu-buffers, cpu, cpu-brute",
+            "gpu-baked, gpu-buffers, gpu-tree, cpu, cpu-brute",
         ),
         ("box.toml --seeds 0", "0 is not in"),
         ("box.toml --time soon", "90s, 2m, 1h30m"),
