@@ -19,6 +19,8 @@ struct Params {
     // 1: goes on where the last dispatch could not finish its samples for want of loop trips; and how many there are.
     resume: u32,
     trips: u32,
+    // 2, which no compiler knows.
+    rounds: u32,
 }
 
 @group(1) @binding(0) var<uniform> params: Params;
@@ -216,7 +218,13 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         }
 
 #if TREE
-        trips_left -= min(trips_left, TRIPS_AT_VERTEX);
+        // What the driver limits are the trips of lanes side by side, of which each knows only its own. Once they are used
+        // up no loop goes round any more, this one neither: what the vertex found is worth nothing then.
+        var rounds = 0u;
+        while rounds < params.rounds {
+            rounds += 1u;
+        }
+        trips_left -= min(trips_left, select(TRIPS_AT_VERTEX, trips_left, rounds < params.rounds));
         if trips_left == 0u {
             going = false;
             count = before;
@@ -266,6 +274,7 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 #if TREE
     left.next[index] = s;
     if s < params.end {
+        count = before;
         atomicAdd(&left.unfinished, 1u);
         atomicMax(&left.stuck, select(0u, index + 1u, s == first));
     }

@@ -316,7 +316,7 @@ impl GpuEngine {
             stride: coprime_stride(all),
             resume: u32::from(resume),
             trips: u32::try_from(self.gpu.trip_limit).unwrap_or(u32::MAX),
-            padding: 0,
+            rounds: 2,
         };
         self.gpu
             .queue

@@ -81,8 +81,8 @@ pub struct Params {
     pub resume: u32,
     /// Loop trips that an invocation may take.
     pub trips: u32,
-    /// Fills the struct to its alignment.
-    pub padding: u32,
+    /// 2: rounds of a loop that tells whether the driver still lets loops go round.
+    pub rounds: u32,
 }
 
 /// The storage buffers of a scene; never empty, for WGSL has no empty arrays.
@@ -297,7 +297,7 @@ mod tests {
             Material { color, kind, specular, exponent }
             DiskLight { center, radius, normal, offset, radiance, face }
             LightCluster { center, radius, power, cos_cone }
-            Params { tile, size, first, end, fresh, seed, groups, first_group, stride, resume, trips }
+            Params { tile, size, first, end, fresh, seed, groups, first_group, stride, resume, trips, rounds }
         };
         // Struct declarations are all that is needed, wherever they stand.
         let mut text = String::new();
