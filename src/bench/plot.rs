@@ -33,6 +33,9 @@ const COLOURS: [RGBColor; 4] = [
     RGBColor(204, 121, 167),
 ];
 
+/// The name in an SVG, for the viewer's own letters; in a PNG ours stand for it.
+const FONT: &str = "sans-serif";
+
 const GREY: RGBColor = RGBColor(120, 120, 120);
 
 /// Picture formats of a plot.
@@ -113,6 +116,25 @@ impl Panel {
         let ends = |p: &[f64; 3]| [p[1] + p[2], (p[1] - p[2]).max(0.5 * p[1])];
         let y = range(points().flat_map(ends).chain(self.floor), [0.8, 1.6]);
         [x, y]
+    }
+}
+
+impl Panel {
+    /// Where the legend hides fewer points: errors fall to the right, so two corners are mostly free.
+    fn free_corner(&self) -> SeriesLabelPosition {
+        let [x, y] = self.ranges();
+        let share = |v: f64, [a, b]: [f64; 2]| (v / a).ln() / (b / a).ln();
+        let (mut left, mut right) = (0, 0);
+        for p in self.curves.iter().flat_map(|c| &c.points) {
+            let (x, y) = (share(p[0], x), share(p[1], y));
+            left += u32::from(x < 0.4 && y < 0.4);
+            right += u32::from(x > 0.6 && y > 0.6);
+        }
+        if right < left {
+            SeriesLabelPosition::UpperRight
+        } else {
+            SeriesLabelPosition::LowerLeft
+        }
     }
 }
 
@@ -201,6 +223,9 @@ fn draw<DB: DrawingBackend>(
     panels: &[Panel],
     scale: u32,
 ) -> Drawn<DB> {
+    // Without a font of our own, text in a PNG would depend on what fonts the system has. It is read once more each
+    // time; that it can be read, the tests have seen.
+    let _ = register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
     area.fill(&WHITE)?;
     let [columns, rows] = grid(panels.len());
     let cells = area.split_evenly((rows as usize, columns as usize));
@@ -216,7 +241,7 @@ fn draw_panel<DB: DrawingBackend>(
     scale: u32,
 ) -> Drawn<DB> {
     let px = |units: f64| units * f64::from(scale);
-    let font = |size: f64| ("sans-serif", px(size)).into_font();
+    let font = |size: f64| (FONT, px(size)).into_font();
     let line = |colour: RGBColor, width: f64| ShapeStyle {
         color: colour.to_rgba(),
         filled: true,
@@ -248,8 +273,11 @@ fn draw_panel<DB: DrawingBackend>(
     // The guide lies below the end of the first curve, where costs besides the samples matter least.
     let last = panel.curves.iter().find_map(|c| c.points.last());
     if let Some([x, y, _]) = last {
-        let guide = |t: f64| (t, 0.7 * y * (t / x).powf(-0.5));
-        let ends = [x0, x1].map(guide);
+        let low = 0.7 * y;
+        let guide = |t: f64| (t, low * (t / x).powf(-0.5));
+        // What leaves the chart is not cut off but bent along its edge.
+        let at = |error: f64| x * (low / error).powi(2);
+        let ends = [x0.max(at(y1)), x1.min(at(y0))].map(guide);
         let dashes = DashedLineSeries::new(ends, px(6.0) as u32, px(4.0) as u32, line(GREY, 1.2));
         chart
             .draw_series(dashes)?
@@ -312,7 +340,7 @@ fn draw_panel<DB: DrawingBackend>(
     }
     chart
         .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
+        .position(panel.free_corner())
         .margin(px(8.0) as i32)
         .legend_area_size(px(18.0) as u32)
         .label_font(TextStyle::from(font(14.0)).pos(Pos::new(HPos::Left, VPos::Top)))
@@ -422,6 +450,19 @@ mod tests {
         };
         assert!(svg(&[empty]).is_ok());
         assert!(svg(&[]).is_ok());
+    }
+
+    #[test]
+    fn the_legend_hides_few_points() {
+        let brute = panel(None).free_corner();
+        assert!(matches!(brute, SeriesLabelPosition::LowerLeft));
+        let mut steep = panel(None);
+        steep.curves.truncate(1);
+        steep.curves[0].points = vec![[0.1, 1.0, 0.0], [0.12, 0.1, 0.0], [1.0, 0.09, 0.0]];
+        assert!(matches!(
+            steep.free_corner(),
+            SeriesLabelPosition::UpperRight
+        ));
     }
 
     #[test]
