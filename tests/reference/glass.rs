@@ -3,7 +3,7 @@
 use crate::build::*;
 use etendue::reference::{Estimator, Met};
 use etendue::scene::{Bsdf, Shape};
-use etendue::world::AIR;
+use etendue::world::{AIR, Geometry};
 use glam::DVec3;
 
 const AIR_IN_GLASS: Bsdf = Bsdf::Dielectric {
@@ -159,13 +159,17 @@ fn nested_solids_know_their_parents_in_any_order() {
             })
             .light(v(0.0, 8.0, 0.0), -DVec3::Y, 1.0, 1.0)
             .world();
-        // Materials are in the order of the file; find each shape by its place in it.
+        // The world has an order of its own: each shape is found by its size or place.
         let by_shape = |shape: usize| {
-            let place = order.iter().position(|&i| i == shape).unwrap();
+            let is_it = |g: &Geometry| match *g {
+                Geometry::Sphere { radius, .. } => [1.0, 0.5, 0.2].get(shape) == Some(&radius),
+                Geometry::Plane { offset, .. } => offset == [0.0, 0.0, 0.0, 3.0, 2.0][shape],
+                _ => false,
+            };
             world
                 .primitives
                 .iter()
-                .find(|p| p.material == place)
+                .find(|p| is_it(&p.geometry))
                 .unwrap()
         };
         assert_eq!(by_shape(3).parent, AIR, "{order:?}");

@@ -4,6 +4,7 @@ use crate::build::*;
 use etendue::film::coverage::Rect;
 use etendue::reference::{Estimator, Met};
 use etendue::settings::Settings;
+use etendue::world::{Geometry, WorldPrimitive};
 use glam::DVec3;
 
 /// The disk's form factor for a receiver parallel to it and for one facing its axis.
@@ -138,6 +139,9 @@ fn a_flush_light_is_wholly_visible_and_lights_the_room() {
         // Flush on the ceiling and on the disk.
         .light(v(0.0, 1.0, 0.0), -DVec3::Y, 0.3, 3.0);
     let tracer = scene.tracer();
+    let ceiling =
+        |p: &WorldPrimitive| matches!(p.geometry, Geometry::Plane { normal, .. } if normal.y < 0.0);
+    let ceiling = tracer.world().primitives.iter().position(ceiling).unwrap();
     let aim = |x: f64, z: f64| ray(v(0.0, 0.4, 0.0), v(x, 0.6, z));
     for k in 0..10_000 {
         let (s, c) = f64::from(k).sin_cos();
@@ -151,7 +155,7 @@ fn a_flush_light_is_wholly_visible_and_lights_the_room() {
         } else if (r * c - 0.1).hypot(r * s) < 0.7 {
             Met::Primitive(0)
         } else {
-            Met::Primitive(1)
+            Met::Primitive(ceiling)
         };
         assert_eq!(hit.met, expected, "{k}");
         assert_eq!(tracer.occluded(&aim(r * c, r * s), 0), r >= 0.3);
