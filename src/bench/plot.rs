@@ -454,15 +454,15 @@ mod tests {
 
     #[test]
     fn the_legend_hides_few_points() {
-        let brute = panel(None).free_corner();
-        assert!(matches!(brute, SeriesLabelPosition::LowerLeft));
-        let mut steep = panel(None);
-        steep.curves.truncate(1);
-        steep.curves[0].points = vec![[0.1, 1.0, 0.0], [0.12, 0.1, 0.0], [1.0, 0.09, 0.0]];
-        assert!(matches!(
-            steep.free_corner(),
-            SeriesLabelPosition::UpperRight
-        ));
+        let corner = |middle: [f64; 3]| {
+            let mut p = panel(None);
+            p.curves.truncate(1);
+            p.curves[0].points = vec![[0.1, 1.0, 0.0], middle, [1.0, 0.1, 0.0]];
+            p.free_corner()
+        };
+        let [fast, slow] = [[0.12, 0.11, 0.0], [0.9, 0.9, 0.0]].map(corner);
+        assert!(matches!(fast, SeriesLabelPosition::UpperRight));
+        assert!(matches!(slow, SeriesLabelPosition::LowerLeft));
     }
 
     #[test]
