@@ -85,10 +85,7 @@ fn glass_resting_on_the_floor_has_a_gap_of_no_width() {
         .light(v(0.0, 4.0, 0.0), -DVec3::Y, 1.0, 1.0);
     let tracer = scene.tracer();
     let rod = tracer.world().primitives[0];
-    assert!(matches!(
-        rod.geometry,
-        etendue::world::Geometry::Cylinder { .. }
-    ));
+    assert!(matches!(rod.geometry, Geometry::Cylinder { .. }));
 
     let top = tracer.intersect(&ray(v(0.1, 3.0, 0.2), -DVec3::Y)).unwrap();
     assert_eq!((top.met, top.t), (Met::Primitive(0), 2.0));
