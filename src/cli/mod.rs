@@ -83,14 +83,18 @@ fn prepare_environment(command: &Command) {
     };
     // Mesa's layer for choosing among screens complains on stderr where there is no screen.
     set("NODEVICE_SELECT", "1");
-    // llvmpipe takes 256-bit vectors of its own accord; with these a sample has the same bits and costs a quarter less.
+    // llvmpipe takes 256-bit vectors of its own accord; with these a sample has the same bits and costs a quarter less. Its
+    // disk cache does not tell kernels of one width from those of another, and would give wrong pictures: no cache then.
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512dq")
         && is_x86_feature_detected!("avx512vl")
+        && std::env::var_os("LP_NATIVE_VECTOR_WIDTH").is_none()
     {
         set("LP_NATIVE_VECTOR_WIDTH", "512");
+        // SAFETY: as above.
+        unsafe { std::env::set_var("MESA_SHADER_CACHE_DISABLE", "true") };
     }
     let talk = match command {
         Command::Render(args) => Some(args.talk),
