@@ -285,9 +285,14 @@ fn faults_are_seen() {
 #[test]
 #[ignore = "hundreds of pictures of up to 200 million paths: a day"]
 fn power_curve_of_an_exponent() {
-    for to in [11.0, 12.0, 14.0, 20.0] {
-        for samples in [1024, 4096, 16384] {
-            let seen = seen(&exponent(to), [128, 96], samples, 20);
+    let curve = [
+        (1024, &[11.0, 12.0, 14.0, 20.0] as &[f64]),
+        (4096, &[11.0, 12.0, 14.0]),
+        (16384, &[11.0, 12.0]),
+    ];
+    for (samples, exponents) in curve {
+        for to in exponents {
+            let seen = seen(&exponent(*to), [128, 96], samples, 20);
             println!("exponent 10 -> {to}, {samples} samples: {seen} of 20");
         }
     }
@@ -296,9 +301,13 @@ fn power_curve_of_an_exponent() {
 #[test]
 #[ignore = "a thousand pictures of 12 million paths: hours"]
 fn faults_are_seen_in_99_of_100_trials() {
+    let mut missed = Vec::new();
     for fault in faults(1.0) {
-        assert!(seen(&fault, [128, 96], 1024, 100) >= 99, "{}", fault.name);
+        if seen(&fault, [128, 96], 1024, 100) < 99 {
+            missed.push(fault.name);
+        }
     }
+    assert!(missed.is_empty(), "{missed:?}");
 }
 
 /// Three trials of each: the quickest look at all five at their stated size. A fault seen in less than 37 % of trials

@@ -155,7 +155,7 @@ impl GpuEngine {
             compilation_options: Default::default(),
             cache: None,
         });
-        let scene = scene::bind(device, &scene_layout, &packed);
+        let scene = scene::bind(&gpu, &scene_layout, &packed);
         let params = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
             size: size_of::<Params>() as u64,

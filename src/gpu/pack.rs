@@ -94,7 +94,7 @@ pub struct Packed {
     pub materials: Vec<Material>,
     /// In the world's order.
     pub lights: Vec<DiskLight>,
-    /// The trees of a kernel that walks them, as tree.wgsl says.
+    /// The trees of a kernel that walks them, as tree.wgsl says: one row of their texture, or whole ones.
     pub nodes: Vec<[u32; 4]>,
     /// The clusters of a kernel that chooses lights by them.
     pub clusters: Vec<LightCluster>,
@@ -140,6 +140,10 @@ fn pack_trees(world: &World, surfaces: &[Surface]) -> Vec<[u32; 4]> {
         }
         let end = group.end() as u32;
         nodes.extend([corner([2e30; 3], end), corner([-2e30; 3], 0)]);
+    }
+    let row = 2 * trees::NODES_A_ROW as usize;
+    if nodes.len() > row {
+        nodes.resize(nodes.len().next_multiple_of(row), [0; 4]);
     }
     nodes
 }

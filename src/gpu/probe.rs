@@ -110,7 +110,7 @@ impl Probe {
             }),
         });
         let scene = (self.scene.as_ref().zip(world))
-            .map(|((layout, access), world)| scene::bind(device, layout, &pack(world, *access)));
+            .map(|((layout, access), world)| scene::bind(gpu, layout, &pack(world, *access)));
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());

@@ -2,9 +2,45 @@
 
 use crate::film::coverage::Rect;
 use crate::world::World;
+use glam::DVec3;
 
-/// For every light that faces the eye, the pixels that its ball may touch: least and greatest x and y.
-pub(super) struct SeenLights(Vec<[f64; 4]>);
+/// A light that faces the eye.
+struct SeenLight {
+    /// Least and greatest x and y of the pixels that its ball may touch.
+    around: [f64; 4],
+    /// From the eye to its centre.
+    to: DVec3,
+    normal: DVec3,
+    radius: f64,
+}
+
+impl SeenLight {
+    /// Whether its disk comes near the pixel that is seen along `w`, of length `far`, to first order.
+    fn touches(&self, w: DVec3, far: f64, half_diagonal: f64) -> bool {
+        // A ball around it, first, which is all there is to say where its plane is seen from the edge.
+        let along = self.to.dot(w) / far;
+        let off = self.to - w * (along / far);
+        if along <= 0.0 || off.length() > self.radius + half_diagonal * self.to.length() {
+            return false;
+        }
+        let fall = self.normal.dot(w);
+        if fall > -3.0 * half_diagonal {
+            return true;
+        }
+        let t = self.normal.dot(self.to) / fall;
+        let spread = 1.5 * t * half_diagonal * (1.0 - far / fall);
+        (w * t - self.to).length() <= self.radius + spread
+    }
+}
+
+/// The lights that a picture may show.
+pub(super) struct SeenLights {
+    lights: Vec<SeenLight>,
+    /// Along the middle of the pixel at the corner, and a step right and down.
+    corner: DVec3,
+    dx: DVec3,
+    dy: DVec3,
+}
 
 impl SeenLights {
     /// Of a world seen in a picture of `size` pixels. Any answer makes the same expected picture; this one holds but at the
@@ -12,6 +48,7 @@ impl SeenLights {
     pub fn new(world: &World, size: [u32; 2]) -> Self {
         let c = &world.camera;
         let pixel = c.dx.length();
+        let [width, height] = size.map(f64::from);
         let project = |l: &crate::world::WorldLight| {
             let to = l.center - c.eye;
             if l.normal.dot(c.eye) <= l.offset {
@@ -21,19 +58,31 @@ impl SeenLights {
             if depth <= -l.radius {
                 return None;
             }
-            // About the plane of the eye a ball may be anywhere.
-            if depth <= l.radius {
-                return Some([0.0, f64::from(size[0]), 0.0, f64::from(size[1])]);
-            }
-            let x = c.dx.dot(to) / (pixel * pixel * depth);
-            let y = c.dy.dot(to) / (pixel * pixel * depth);
-            // Seen aslant a ball looks longer.
-            let stretch = |t: f64| (1.0 + (t * pixel).powi(2)).sqrt();
-            let reach = l.radius / ((depth - l.radius) * pixel) * stretch(x.hypot(y)) + 1.0;
-            let (x, y) = (x + f64::from(size[0]) / 2.0, y + f64::from(size[1]) / 2.0);
-            Some([x - reach, x + reach, y - reach, y + reach])
+            let around = if depth <= l.radius {
+                // About the plane of the eye a ball may be anywhere.
+                [0.0, width, 0.0, height]
+            } else {
+                let x = c.dx.dot(to) / (pixel * pixel * depth);
+                let y = c.dy.dot(to) / (pixel * pixel * depth);
+                // Seen aslant a ball looks longer.
+                let stretch = |t: f64| (1.0 + (t * pixel).powi(2)).sqrt();
+                let reach = l.radius / ((depth - l.radius) * pixel) * stretch(x.hypot(y)) + 1.0;
+                let (x, y) = (x + width / 2.0, y + height / 2.0);
+                [x - reach, x + reach, y - reach, y + reach]
+            };
+            Some(SeenLight {
+                around,
+                to,
+                normal: l.normal,
+                radius: l.radius,
+            })
         };
-        Self(world.lights.iter().filter_map(project).collect())
+        Self {
+            lights: world.lights.iter().filter_map(project).collect(),
+            corner: c.forward + (0.5 - width / 2.0) * c.dx + (0.5 - height / 2.0) * c.dy,
+            dx: c.dx,
+            dy: c.dy,
+        }
     }
 
     /// For every pixel of a tile, in rows, 1 if it may see one.
@@ -42,11 +91,21 @@ impl SeenLights {
         let mut seen = vec![0; width * rect.height() as usize];
         // `as` keeps what lies outside within.
         let within = |x: f64, first: u32, end: u32| (x as u32).clamp(first, end) - first;
-        for &[x0, x1, y0, y1] in &self.0 {
+        let half_diagonal = 0.75 * self.dx.length();
+        for light in &self.lights {
+            let [x0, x1, y0, y1] = light.around;
             let columns = within(x0.floor(), rect.x0, rect.x1)..within(x1.ceil(), rect.x0, rect.x1);
             for y in within(y0.floor(), rect.y0, rect.y1)..within(y1.ceil(), rect.y0, rect.y1) {
+                let left =
+                    self.corner + f64::from(rect.x0) * self.dx + f64::from(rect.y0 + y) * self.dy;
                 let row = &mut seen[y as usize * width..][..width];
-                row[columns.start as usize..columns.end as usize].fill(1);
+                for x in columns.clone() {
+                    let pixel = &mut row[x as usize];
+                    if *pixel == 0 {
+                        let w = left + f64::from(x) * self.dx;
+                        *pixel = u32::from(light.touches(w, w.length(), half_diagonal));
+                    }
+                }
             }
         }
         seen

@@ -397,6 +397,7 @@ fn constants(world: &World, settings: &Settings) -> String {
     constant("CAMERA_MEDIUM", "u32", format!("{}u", c.medium));
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
+    constant("NODES_A_ROW", "u32", format!("{}u", trees::NODES_A_ROW));
     constant("GLANCES", "u32", format!("{GLANCES}u"));
     constant("BLOCK", "u32", format!("{BLOCK}u"));
     constant("REPLICATES", "u32", format!("{REPLICATES}u"));

@@ -16,6 +16,9 @@ const LEAST_IN_TREE: usize = 24;
 /// Nodes that a trip of a walk's loop visits: the trips that older drivers grant go farther, and it costs nothing.
 const VISITS_A_TRIP: usize = 2;
 
+/// Nodes in a row of the texture that holds them.
+pub(crate) const NODES_A_ROW: u32 = 2048;
+
 /// Surfaces that one function meets, and where their tree lies.
 pub(crate) struct Group {
     /// The function.
@@ -130,17 +133,17 @@ fn walk(group: &Group, going_on: &str, leaf: &str) -> String {
     let (header, end) = (group.header, group.end());
     let start = format!(
         "    var hit = first;
-    let slabs = slabs_of(ray, bitcast<f32>(nodes[{}u].x));
+    let slabs = slabs_of(ray, bitcast<f32>(node_low({}u).x));
     var node = {}u;
     while node < {end}u && {going_on}trips_left > 0u {{
         trips_left -= 1u;
 ",
-        2 * header,
+        header,
         header + 1
     );
     let visit = "
-            let a = nodes[2u * node];
-            let b = nodes[2u * node + 1u];
+            let a = node_low(node);
+            let b = node_high(node);
             let leaf = b.w != 0u;
             let met = meets_box(slabs, bitcast<vec3f>(a.xyz), bitcast<vec3f>(b.xyz), hit.t);
 ";
