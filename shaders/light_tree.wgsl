@@ -11,14 +11,16 @@ struct LightCluster {
     cos_cone: f32,
 }
 
-// Cluster k has the halves 2k and 2k + 1; the first is 1. The last LIGHT_CLUSTERS have LIGHTS_A_CLUSTER lights each.
-@group(0) @binding(4) var<storage, read> light_clusters: array<LightCluster>;
-// The lights in the order of the clusters, NONE where there is none; then of each light its place in that order.
-@group(0) @binding(5) var<storage, read> light_places: array<u32>;
+// Cluster k has the halves 2k and 2k + 1; the first is 1. The last LIGHT_CLUSTERS have four lights each.
+fn light_cluster(k: u32) -> LightCluster {
+    let a = bitcast<vec4f>(record(CLUSTER_RECORDS + 2u * k));
+    let b = bitcast<vec4f>(record(CLUSTER_RECORDS + 2u * k + 1u));
+    return LightCluster(a.xyz, a.w, b.xyz, b.w);
+}
 
-// Cosine of max(a - b, 0), for angles from 0 to pi by their cosines.
-fn cos_of_difference(a: f32, b: f32) -> f32 {
-    return select(a * b + safe_sqrt(1.0 - a * a) * safe_sqrt(1.0 - b * b), 1.0, a >= b);
+// The lights of such a cluster; NONE where there is none.
+fn lights_of(cluster: u32) -> vec4u {
+    return record(FOUR_RECORDS + cluster - LIGHT_CLUSTERS);
 }
 
 // About what the cluster sends to a receiver with normal n at p; 0 only when none of it can.
@@ -26,33 +28,43 @@ fn cluster_importance(c: LightCluster, p: vec3f, n: vec3f) -> f32 {
     let power = length(c.power);
     let v = p - c.center;
     let distance = length(v);
+    // How far before the receiver's plane any of the ball lies, and p before the plane of any light: its normal is at best
+    // turned from the cone's axis towards p, by the cone's half angle.
+    let receiver = c.radius - dot(n, v);
+    let along = dot(c.power, v) / max(power, TINY);
+    let turned = c.cos_cone * along + safe_sqrt((1.0 - c.cos_cone * c.cos_cone) * max(distance * distance - along * along, 0.0));
+    let light = c.radius + select(turned, distance, along >= c.cos_cone * distance);
     let far = distance > c.radius;
-    let w = v / max(distance, TINY);
-    let sine = min(c.radius / max(distance, TINY), 1.0);
-    let cos_ball = safe_sqrt(1.0 - sine * sine);
-    // The smallest angle that any of it can have to a normal there, and to the receiver's.
-    let light = cos_of_difference(cos_of_difference(dot(c.power, w) / max(power, TINY), c.cos_cone), cos_ball);
-    let receiver = cos_of_difference(-dot(n, w), cos_ball);
+    let inverse = 1.0 / max(max(distance, c.radius), TINY);
     // Cosines have errors, the more in the small ones.
-    let dark = power == 0.0 || (far && (light < -0.002 || receiver < -0.002));
-    let cosines = select(1.0, max(light, 0.01) * max(receiver, 0.01), far);
-    let nearest = max(distance, c.radius);
-    return select(max(power * cosines / max(nearest * nearest, TINY), TINY), 0.0, dark);
+    let cosines = vec2f(light, receiver) * inverse;
+    let dark = power == 0.0 || (far && (cosines.x < -0.002 || cosines.y < -0.002));
+    let both = clamp(cosines, vec2f(0.01), vec2f(1.0));
+    let weight = power * select(1.0, both.x * both.y, far) * inverse * inverse;
+    return select(max(weight, TINY), 0.0, dark);
 }
 
 // The probability of the first half of a cluster.
 fn first_half(k: u32, p: vec3f, n: vec3f) -> f32 {
-    let a = min(cluster_importance(light_clusters[2u * k], p, n), 1.0e30);
-    let b = min(cluster_importance(light_clusters[2u * k + 1u], p, n), 1.0e30);
+    let a = min(cluster_importance(light_cluster(2u * k), p, n), 1.0e30);
+    let b = min(cluster_importance(light_cluster(2u * k + 1u), p, n), 1.0e30);
     let share = a / max(a + b, TINY);
     // The importance is a guess: neither half that may shine is left to less than one choice in five hundred.
     return select(share, clamp(share, 0.002, 0.998), a > 0.0 && b > 0.0);
 }
 
-fn weight_at(place: u32, p: vec3f, n: vec3f) -> f32 {
-    let index = light_places[place];
-    let light = lights[select(0u, index, index != NONE)];
-    return select(light_weight(light, p, n), 0.0, index == NONE);
+fn weight_of(index: u32, p: vec3f, n: vec3f) -> f32 {
+    let weight = light_weight(light_at(select(0u, index, index != NONE)), p, n);
+    return select(weight, 0.0, index == NONE);
+}
+
+fn weights_of(four: vec4u, p: vec3f, n: vec3f) -> vec4f {
+    return vec4f(
+        weight_of(four.x, p, n),
+        weight_of(four.y, p, n),
+        weight_of(four.z, p, n),
+        weight_of(four.w, p, n)
+    );
 }
 
 // Two random numbers: so many levels would use up the digits of one.
@@ -71,41 +83,46 @@ fn choose_light(p: vec3f, n: vec3f, u: vec2f) -> Chosen {
         probability *= taken;
         k = 2u * k + select(1u, 0u, first);
     }
-    // One pass: each light replaces the choice with its share of the sum so far.
-    let begin = (k - LIGHT_CLUSTERS) * LIGHTS_A_CLUSTER;
-    var place = begin;
-    var chosen = 0.0;
-    var sum = 0.0;
-    for (var i = 0u; i < LIGHTS_A_CLUSTER; i++) {
-        let w = weight_at(begin + i, p, n);
-        sum += w;
-        let share = w / select(sum, 1.0, sum <= 0.0);
-        let take = v < share;
-        v = select((v - share) / max(1.0 - share, TINY), v / max(share, TINY), take);
-        place = select(place, begin + i, take);
-        chosen = select(chosen, w, take);
-    }
-    let found = light_places[place];
+    let four = lights_of(k);
+    let weights = weights_of(four, p, n);
+    let two = weights.x + weights.y;
+    let three = two + weights.z;
+    let sum = three + weights.w;
+    let at = v * sum;
+    // The last one with any weight whose share begins at or below it.
+    var found = four.x;
+    var chosen = weights.x;
+    let second = weights.y > 0.0 && (at >= weights.x || chosen == 0.0);
+    found = select(found, four.y, second);
+    chosen = select(chosen, weights.y, second);
+    let third = weights.z > 0.0 && (at >= two || chosen == 0.0);
+    found = select(found, four.z, third);
+    chosen = select(chosen, weights.z, third);
+    let fourth = weights.w > 0.0 && (at >= three || chosen == 0.0);
+    found = select(found, four.w, fourth);
+    chosen = select(chosen, weights.w, fourth);
     let index = select(0u, found, found != NONE);
-    let light = lights[index];
+    let light = light_at(index);
     probability *= chosen;
     return Chosen(light, index, cap_of(light, p), select(sum / max(probability, TINY), 0.0, probability <= 0.0), 1.0);
 }
 
 // The probability with which choose_light takes a light.
 fn light_probability(index: u32, p: vec3f, n: vec3f) -> f32 {
-    let place = light_places[LIGHT_CLUSTERS * LIGHTS_A_CLUSTER + index];
-    let cluster = LIGHT_CLUSTERS + place / LIGHTS_A_CLUSTER;
+    let places = record(PLACE_RECORDS + index / 4u);
+    let place = select(
+        select(places.x, places.y, index % 4u == 1u),
+        select(places.z, places.w, index % 4u == 3u),
+        index % 4u >= 2u
+    );
+    let cluster = LIGHT_CLUSTERS + place / 4u;
     var probability = 1.0;
     for (var level = LIGHT_LEVELS; level > 0u; level--) {
         let share = first_half(cluster >> level, p, n);
         let second = (cluster >> (level - 1u)) & 1u;
         probability *= select(share, 1.0 - share, second == 1u);
     }
-    let begin = place / LIGHTS_A_CLUSTER * LIGHTS_A_CLUSTER;
-    var sum = 0.0;
-    for (var i = 0u; i < LIGHTS_A_CLUSTER; i++) {
-        sum += weight_at(begin + i, p, n);
-    }
-    return probability * weight_at(place, p, n) / max(sum, TINY);
+    let weights = weights_of(lights_of(cluster), p, n);
+    let sum = weights.x + weights.y + weights.z + weights.w;
+    return probability * weight_of(index, p, n) / max(sum, TINY);
 }

@@ -293,7 +293,7 @@ fn emission(path: Path, hit: Hit) -> vec3f {
     var share = select(0.0, 1.0, front && kept(path.depth - 1u));
 #if LIGHT_SAMPLING
 #if MIS
-    if !path.specular {
+    if !path.specular && path.pdf > 0.0 {
         let cap = cap_of(light, path.ray.o);
         var pdf = cap_pdf(light, cap, path.ray.d);
 #if LIGHT_TREE
@@ -303,7 +303,9 @@ fn emission(path: Path, hit: Hit) -> vec3f {
         pdf *= light_weight(light, path.ray.o, path.n) / fmax(path.weights, TINY);
 #endif
 #endif
-        share *= select(0.0, power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * pdf), path.pdf > 0.0);
+        share *= power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * pdf);
+    } else {
+        share *= select(0.0, 1.0, path.specular);
     }
 #else
     share *= select(0.0, 1.0, path.specular);

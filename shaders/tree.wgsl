@@ -1,23 +1,17 @@
-// Walking a bounding volume hierarchy that lies in a list, depth first: a node that is missed names the node to go on
-// with, so there is no stack. The walk itself is generated for each kind of surface.
+// Walking a bounding volume hierarchy without a stack: node k has the children 2k and 2k + 1, and one bit for each level says
+// whether the sibling of the node there is still to be visited. The walk itself is generated for each kind of surface.
 
-// Two for each node, the second's last word 0:
-//   least corner, number of the node after all that is below it; greatest corner, 0.
-// Of a leaf that word is 2 (number of the surface + 1), + 1 if it can block light. The leaf of a sphere has instead
-//   centre, as above; radius, solid, parent, as above.
-// Before each tree: farthest from the origin that it reaches; after it, a node that nothing meets and that leads to
-// itself.
-// In a storage texture: where each lane has an index of its own lavapipe loads from a buffer word by word, and from a
-// sampled texture with a level of detail for each lane, five to ten times as slow.
-@group(0) @binding(3) var nodes: texture_storage_2d<rgba32uint, read>;
+// Each node has four records. The first three are twelve words, six for each child. Those of a box are
+//   its least corner, its greatest corner.
+// Of spheres the sixth word is LEAF, and the others are
+//   centre, radius, 2 (number of the surface + 1), + 1 if it can block light;
+// where they bound solids the fourth record has solid and parent of both children. Of other surfaces each has a node of its own,
+// whose twelfth word is LEAF and whose first is that number. Before each tree: farthest from the origin that it
+// reaches. Node 0 has two boxes that nothing meets: where a walk goes when it is done.
+const LEAF: u32 = 0xffffffffu;
 
-fn node_low(node: u32) -> vec4u {
-    return textureLoad(nodes, vec2u(2u * (node % NODES_A_ROW), node / NODES_A_ROW));
-}
-
-fn node_high(node: u32) -> vec4u {
-    return textureLoad(nodes, vec2u(2u * (node % NODES_A_ROW) + 1u, node / NODES_A_ROW));
-}
+// Farther than anything.
+const MISSED: f32 = 1.0e38;
 
 // What is left of the loop trips that the driver grants an invocation. When none are left the walk is no use, and the
 // sample is begun again by the next dispatch.
@@ -44,12 +38,30 @@ fn slabs_of(ray: Ray, reach: f32) -> Slabs {
     return Slabs(ray.o + against, ray.o - against, inverse, backwards);
 }
 
-// Whether the ray meets the box no farther than t.
-fn meets_box(s: Slabs, low: vec3f, high: vec3f, t: f32) -> bool {
+// Where the ray enters the box, if no farther than t, else MISSED.
+fn box_entry(s: Slabs, low: vec3f, high: vec3f, t: f32) -> f32 {
     let enter = (select(low, high, s.backwards) - s.enter) * s.inverse;
     let leave = (select(high, low, s.backwards) - s.leave) * s.inverse;
-    let near = max(max(enter.x, enter.y), max(enter.z, 0.0));
-    let far = min(min(leave.x, leave.y), min(leave.z, t));
+    let near = fmax(fmax(enter.x, enter.y), fmax(enter.z, 0.0));
+    let far = fmin(fmin(leave.x, leave.y), fmin(leave.z, t));
     // Distances have errors of their own.
-    return near * 0.99999 <= far;
+    return select(MISSED, near, near * 0.99999 <= far);
+}
+
+// Where a walk is: a node, and for each level, the lowest bit its own, whether the sibling there is still to be visited.
+struct Place {
+    node: u32,
+    siblings: u32,
+}
+
+// Goes on to the nearer child that is met, or else to the last sibling that was put off.
+fn onward(at: Place, entry_0: f32, entry_1: f32) -> Place {
+    let second = entry_1 < entry_0;
+    let met = fmin(entry_0, entry_1) < MISSED;
+    let both = fmax(entry_0, entry_1) < MISSED;
+    let levels = firstTrailingBit(at.siblings | 0x80000000u);
+    let node = select((at.node >> levels) ^ 1u, 2u * at.node + u32(second), met);
+    let siblings = select((at.siblings >> levels) ^ 1u, 2u * at.siblings + u32(both), met);
+    let over = !met && at.siblings == 0u;
+    return Place(select(node, 0u, over), select(siblings, 0u, over));
 }

@@ -120,8 +120,7 @@ impl GpuEngine {
         }
         let packed = pack(world, kernel.access);
         let device = &gpu.device;
-        let limit = device.limits().max_storage_buffer_binding_size;
-        if let Some(problem) = scene::too_large(&packed, limit) {
+        if let Some(problem) = scene::too_large(&packed, &device.limits()) {
             return Err(unable(problem));
         }
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
@@ -130,7 +129,7 @@ impl GpuEngine {
         // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
         // length, or pixels that it compares with the tile's size first; its loops run over constant
         // ranges, over samples, each at most max_depth vertices and some glances long, or along nodes whose
-        // next ones always have higher numbers.
+        // next ones come later in a fixed order of the tree.
         let module = unsafe {
             device.create_shader_module_trusted(
                 wgpu::ShaderModuleDescriptor {

@@ -1,9 +1,10 @@
 //! Host twins of the kernel's structs, and the scene packed into them.
 
 use crate::kernel::lights::{self, LightTree};
+use crate::kernel::records::{self, RECORDS_A_ROW, Records};
 use crate::kernel::{Access, material_tag, shape_tag, trees};
 use crate::scene::Bsdf;
-use crate::world::{Geometry, Tree, World};
+use crate::world::{Geometry, Node, Tree, World};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
@@ -85,7 +86,7 @@ pub struct Params {
     pub rounds: u32,
 }
 
-/// The storage buffers of a scene; never empty, for WGSL has no empty arrays.
+/// What of a scene lies on the device; never empty, for WGSL has no empty arrays.
 #[derive(Debug, Clone)]
 pub struct Packed {
     /// Lights first, then the world's primitives.
@@ -94,12 +95,8 @@ pub struct Packed {
     pub materials: Vec<Material>,
     /// In the world's order.
     pub lights: Vec<DiskLight>,
-    /// The trees of a kernel that walks them, as tree.wgsl says: one row of their texture, or whole ones.
-    pub nodes: Vec<[u32; 4]>,
-    /// The clusters of a kernel that chooses lights by them.
-    pub clusters: Vec<LightCluster>,
-    /// The lights in their order.
-    pub places: Vec<u32>,
+    /// All that a kernel with trees reads, as records.wgsl and tree.wgsl say: one row of their texture, or whole ones.
+    pub records: Vec<[u32; 4]>,
 }
 
 fn f(v: DVec3) -> [f32; 3] {
@@ -107,57 +104,105 @@ fn f(v: DVec3) -> [f32; 3] {
 }
 
 /// The trees of [`Access::Tree`], one after the other, as tree.wgsl says.
-fn pack_trees(world: &World, surfaces: &[Surface]) -> Vec<[u32; 4]> {
-    let corner = |x: [f32; 3], last: u32| {
-        let [x, y, z] = x.map(f32::to_bits);
-        [x, y, z, last]
-    };
+fn pack_trees(world: &World, parted: &trees::Parted, surfaces: &[Surface]) -> Vec<[u32; 4]> {
     let blocks = trees::blockers(world);
-    let mut nodes: Vec<[u32; 4]> = Vec::new();
-    for group in &trees::Parted::new(world).groups {
-        debug_assert_eq!(nodes.len(), 2 * group.header);
+    let mut records: Vec<[u32; 4]> = Vec::new();
+    for group in &parted.groups {
+        debug_assert_eq!(records.len(), group.header);
         let tree = Tree::new(&trees::boxes(world, group));
-        let first = group.header as u32 + 1;
-        let reach = tree.nodes.first().map_or(0.0, |root| {
-            root.min.iter().chain(&root.max).map(|x| x.abs()).sum()
-        });
-        nodes.extend([corner([reach, 0.0, 0.0], 0), [0; 4]]);
-        for n in &tree.nodes {
-            let escape = first + n.escape;
-            let Some(item) = n.item else {
-                nodes.extend([corner(n.min, escape), corner(n.max, 0)]);
-                continue;
+        let root = &tree.nodes[1];
+        let reach: f32 = root.min.iter().chain(&root.max).map(|x| x.abs()).sum();
+        records.extend([[reach.to_bits(), 0, 0, 0], [0; 4], [0; 4], [0; 4]]);
+        let number = |item: u32| group.numbers[item as usize];
+        let code = |item: u32| 2 * (number(item) as u32 + 1) + u32::from(blocks[number(item)]);
+        for k in 0..group.nodes() {
+            let below = |n: Node| -> [u32; 6] {
+                let [x, y, z] = n.min.map(f32::to_bits);
+                let [u, v, w] = n.max.map(f32::to_bits);
+                match n.item {
+                    Some(item) if group.spheres() => {
+                        let s = &surfaces[number(item)];
+                        let [x, y, z] = s.point.map(f32::to_bits);
+                        [x, y, z, s.radius.to_bits(), code(item), u32::MAX]
+                    }
+                    _ => [x, y, z, u, v, w],
+                }
             };
-            let number = group.numbers[item as usize];
-            let word = 2 * (number as u32 + 1) + u32::from(blocks[number]);
-            if group.spheres() {
-                let s = &surfaces[number];
-                nodes.push(corner(s.point, escape));
-                nodes.push([s.radius.to_bits(), s.solid, s.parent, word]);
-            } else {
-                nodes.extend([corner(n.min, escape), corner(n.max, word)]);
-            }
+            let children = match (k, tree.nodes[k].item) {
+                (0, _) => [Node::EMPTY; 2],
+                // One alone.
+                (_, Some(_)) if group.spheres() && k == 1 => [*root, Node::EMPTY],
+                (_, Some(item)) => {
+                    records.extend([[code(item), 0, 0, 0], [0; 4], [0, 0, 0, u32::MAX], [0; 4]]);
+                    continue;
+                }
+                _ => [2 * k, 2 * k + 1].map(|c| *tree.nodes.get(c).unwrap_or(&Node::EMPTY)),
+            };
+            let [[a, b, c, d, e, f], [g, h, i, j, k, l]] = children.map(below);
+            let solid = |n: Node| {
+                n.item.filter(|_| group.solids()).map_or([0; 2], |item| {
+                    let s = &surfaces[number(item)];
+                    [s.solid, s.parent]
+                })
+            };
+            let [[m, n], [o, p]] = children.map(solid);
+            records.extend([[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]]);
         }
-        let end = group.end() as u32;
-        nodes.extend([corner([2e30; 3], end), corner([-2e30; 3], 0)]);
     }
-    let row = 2 * trees::NODES_A_ROW as usize;
-    if nodes.len() > row {
-        nodes.resize(nodes.len().next_multiple_of(row), [0; 4]);
-    }
-    nodes
+    records
 }
 
-/// The light clusters of a world, and the lights in their order.
-fn pack_lights(world: &World) -> (Vec<LightCluster>, Vec<u32>) {
+/// The light clusters of a world, and which lights are where, as light_tree.wgsl says.
+fn pack_lights(world: &World) -> Vec<[u32; 4]> {
     let tree = LightTree::new(world);
-    let cluster = |c: &lights::Cluster| LightCluster {
-        center: f(c.center),
-        radius: c.radius as f32,
-        power: f(c.power),
-        cos_cone: c.cos_cone as f32,
-    };
-    (tree.clusters.iter().map(cluster).collect(), tree.places)
+    let clusters: Vec<LightCluster> = tree
+        .clusters
+        .iter()
+        .map(|c: &lights::Cluster| LightCluster {
+            center: f(c.center),
+            radius: c.radius as f32,
+            power: f(c.power),
+            cos_cone: c.cos_cone as f32,
+        })
+        .collect();
+    let mut records: Vec<[u32; 4]> = bytemuck::cast_slice(&clusters).to_vec();
+    // See [`Records::clusters`].
+    records.resize(2 * records.len(), [0; 4]);
+    records.extend(tree.order);
+    records.extend(tree.places.chunks(lights::LIGHTS_A_CLUSTER).map(|four| {
+        let mut record = [0; lights::LIGHTS_A_CLUSTER];
+        record[..four.len()].copy_from_slice(four);
+        record
+    }));
+    records
+}
+
+/// Everything for a kernel with trees.
+fn pack_records(
+    world: &World,
+    surfaces: &[Surface],
+    materials: &[Material],
+    lights: &[DiskLight],
+) -> Vec<[u32; 4]> {
+    let parted = trees::Parted::new(world);
+    let at = Records::new(world, &parted);
+    let mut records = pack_trees(world, &parted, surfaces);
+    debug_assert_eq!(records.len(), at.surfaces);
+    records.extend_from_slice(bytemuck::cast_slice(surfaces));
+    debug_assert_eq!(records.len(), at.materials);
+    records.extend_from_slice(bytemuck::cast_slice(materials));
+    debug_assert_eq!(records.len(), at.lights);
+    records.extend_from_slice(bytemuck::cast_slice(lights));
+    debug_assert_eq!(records.len(), at.clusters);
+    if records::clustered(world) {
+        records.extend(pack_lights(world));
+    }
+    debug_assert_eq!(records.len(), at.end);
+    let row = RECORDS_A_ROW as usize;
+    if records.len() > row {
+        records.resize(records.len().next_multiple_of(row), [0; 4]);
+    }
+    records
 }
 
 /// Packs a world for kernels of this kind.
@@ -250,17 +295,12 @@ pub fn pack(world: &World, access: Access) -> Packed {
             face: l.face,
         })
         .collect();
-    let (mut nodes, mut clusters, mut places) = Default::default();
-    if access == Access::Tree {
-        nodes = pack_trees(world, &surfaces);
-        (clusters, places) = pack_lights(world);
-    }
-    if nodes.is_empty() {
-        nodes.push([0; 4]);
-    }
-    if clusters.is_empty() {
-        clusters.push(LightCluster::default());
-        places.push(0);
+    let mut records = match access {
+        Access::Tree => pack_records(world, &surfaces, &materials, &lights),
+        Access::Baked | Access::Buffers => Vec::new(),
+    };
+    if records.is_empty() {
+        records.push([0; 4]);
     }
     if surfaces.is_empty() {
         surfaces.push(Surface::default());
@@ -275,9 +315,7 @@ pub fn pack(world: &World, access: Access) -> Packed {
         surfaces,
         materials,
         lights,
-        nodes,
-        clusters,
-        places,
+        records,
     }
 }
 

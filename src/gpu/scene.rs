@@ -1,14 +1,14 @@
-//! Group 0 of every kernel: the storage buffers of a scene, and the texture that holds its trees.
+//! Group 0 of every kernel: the storage buffers of a scene, and the texture of records for kernels with trees.
 
 use super::Gpu;
 use super::pack::Packed;
-use crate::kernel::trees::NODES_A_ROW;
+use crate::kernel::records::RECORDS_A_ROW;
 use wgpu::util::DeviceExt as _;
 
-/// The binding of the trees.
-const NODES: u32 = 3;
+/// The binding of the records.
+const RECORDS: u32 = 3;
 
-/// What is only read: surfaces, materials, lights; trees, light clusters, and the lights in their order.
+/// What is only read: surfaces, materials, lights, records.
 pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let buffer = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Storage { read_only: true },
@@ -23,12 +23,12 @@ pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entry = |binding: u32| wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
-        ty: if binding == NODES { texture } else { buffer },
+        ty: if binding == RECORDS { texture } else { buffer },
         count: None,
     };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("scene"),
-        entries: &[0, 1, 2, 3, 4, 5].map(entry),
+        entries: &[0, 1, 2, 3].map(entry),
     })
 }
 
@@ -45,16 +45,12 @@ pub(super) fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, packed: &Packed) -
     let surfaces = buffer(bytemuck::cast_slice(&packed.surfaces));
     let materials = buffer(bytemuck::cast_slice(&packed.materials));
     let lights = buffer(bytemuck::cast_slice(&packed.lights));
-    let clusters = buffer(bytemuck::cast_slice(&packed.clusters));
-    let places = buffer(bytemuck::cast_slice(&packed.places));
-    let nodes = nodes(gpu, &packed.nodes);
+    let records = records(gpu, &packed.records);
     let resources = [
         surfaces.as_entire_binding(),
         materials.as_entire_binding(),
         lights.as_entire_binding(),
-        wgpu::BindingResource::TextureView(&nodes),
-        clusters.as_entire_binding(),
-        places.as_entire_binding(),
+        wgpu::BindingResource::TextureView(&records),
     ];
     let mut binding = 0..;
     let entries = resources.map(|resource| wgpu::BindGroupEntry {
@@ -68,14 +64,14 @@ pub(super) fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, packed: &Packed) -
     })
 }
 
-/// The trees as a texture: one row, or whole ones.
-fn nodes(gpu: &Gpu, nodes: &[[u32; 4]]) -> wgpu::TextureView {
-    let width = (nodes.len() as u32).min(2 * NODES_A_ROW);
+/// A texture of one row, or of whole ones.
+fn records(gpu: &Gpu, records: &[[u32; 4]]) -> wgpu::TextureView {
+    let width = (records.len() as u32).min(RECORDS_A_ROW);
     let descriptor = wgpu::TextureDescriptor {
-        label: Some("nodes"),
+        label: Some("records"),
         size: wgpu::Extent3d {
             width,
-            height: nodes.len() as u32 / width,
+            height: records.len() as u32 / width,
             depth_or_array_layers: 1,
         },
         mip_level_count: 1,
@@ -85,7 +81,7 @@ fn nodes(gpu: &Gpu, nodes: &[[u32; 4]]) -> wgpu::TextureView {
         usage: wgpu::TextureUsages::STORAGE_BINDING,
         view_formats: &[],
     };
-    let bytes = bytemuck::cast_slice(nodes);
+    let bytes = bytemuck::cast_slice(records);
     let order = wgpu::util::TextureDataOrder::LayerMajor;
     let texture = gpu
         .device
@@ -93,8 +89,9 @@ fn nodes(gpu: &Gpu, nodes: &[[u32; 4]]) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// What is too large for a device that binds at most `limit` bytes, with the numbers.
-pub(super) fn too_large(packed: &Packed, limit: u64) -> Option<String> {
+/// What is too large for a device, with the numbers.
+pub(super) fn too_large(packed: &Packed, limits: &wgpu::Limits) -> Option<String> {
+    let bound = limits.max_storage_buffer_binding_size;
     let sizes = [
         (
             "surfaces",
@@ -102,23 +99,24 @@ pub(super) fn too_large(packed: &Packed, limit: u64) -> Option<String> {
             size_of_val(&packed.surfaces[..]),
         ),
         (
-            "surfaces",
-            packed.surfaces.len(),
-            size_of_val(&packed.nodes[..]),
-        ),
-        (
             "materials",
             packed.materials.len(),
             size_of_val(&packed.materials[..]),
         ),
-        (
-            "lights",
-            packed.lights.len(),
-            size_of_val(&packed.clusters[..]),
-        ),
     ];
-    let (what, count, bytes) = sizes.into_iter().find(|s| s.2 as u64 > limit)?;
-    Some(format!(
-        "{count} {what} need a storage buffer of {bytes} bytes, it binds {limit} at most"
-    ))
+    for (what, count, bytes) in sizes {
+        if bytes as u64 > bound {
+            return Some(format!(
+                "{count} {what} need a storage buffer of {bytes} bytes, it binds {bound} at most"
+            ));
+        }
+    }
+    let rows = packed.records.len().div_ceil(RECORDS_A_ROW as usize);
+    let most = limits.max_texture_dimension_2d;
+    (rows > most as usize).then(|| {
+        format!(
+            "{} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, it has {most} at most",
+            packed.surfaces.len()
+        )
+    })
 }

@@ -5,8 +5,8 @@ use glam::DVec3;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-/// Lights of one cluster at the end of the tree, among which the closed form chooses.
-const LIGHTS_A_CLUSTER: usize = 4;
+/// Lights of one cluster at the end of the tree, among which the closed form chooses: the shader knows it.
+pub(crate) const LIGHTS_A_CLUSTER: usize = 4;
 
 /// Scenes with more lights choose among them by a tree: a look at every light for every choice is the better choice, but
 /// costs more and more.
@@ -29,12 +29,14 @@ pub(crate) struct Cluster {
 pub(crate) struct LightTree {
     /// Cluster k has the halves 2k and 2k + 1; number 0 is none.
     pub clusters: Vec<Cluster>,
-    /// Indices of lights, `u32::MAX` for none; then of each light its place among them.
+    /// Indices of lights, `u32::MAX` for none: of each cluster at the end of the tree.
+    pub order: Vec<[u32; LIGHTS_A_CLUSTER]>,
+    /// Of each light its place among them.
     pub places: Vec<u32>,
 }
 
 /// Clusters at the end of the tree of so many lights: a power of two.
-fn ends(lights: usize) -> usize {
+pub(crate) fn ends(lights: usize) -> usize {
     lights.div_ceil(LIGHTS_A_CLUSTER).next_power_of_two()
 }
 
@@ -44,7 +46,6 @@ pub(super) fn constants(world: &World) -> String {
     let mut s = String::new();
     for (name, value) in [
         ("LIGHT_CLUSTERS", ends),
-        ("LIGHTS_A_CLUSTER", LIGHTS_A_CLUSTER),
         ("LIGHT_LEVELS", ends.ilog2() as usize),
     ] {
         let _ = writeln!(s, "const {name}: u32 = {value}u;");
@@ -54,7 +55,7 @@ pub(super) fn constants(world: &World) -> String {
 
 /// Loop trips of one choice, and of one look-up of a probability.
 pub(super) fn trips(world: &World) -> u64 {
-    u64::from(ends(world.lights.len()).ilog2()) + LIGHTS_A_CLUSTER as u64
+    u64::from(ends(world.lights.len()).ilog2())
 }
 
 impl LightTree {
@@ -64,7 +65,8 @@ impl LightTree {
         let ends = ends(lights.len());
         let mut tree = Self {
             clusters: vec![Cluster::default(); 2 * ends],
-            places: vec![u32::MAX; ends * LIGHTS_A_CLUSTER + lights.len()],
+            order: vec![[u32::MAX; LIGHTS_A_CLUSTER]; ends],
+            places: vec![0; lights.len()],
         };
         let brightest = lights.iter().map(power).fold(0.0, f64::max);
         let mut order: Vec<usize> = (0..lights.len()).collect();
@@ -77,10 +79,9 @@ impl LightTree {
         self.clusters[k] = cluster(lights, brightest, these);
         let ends = self.clusters.len() / 2;
         if k >= ends {
-            let begin = (k - ends) * LIGHTS_A_CLUSTER;
-            for (place, &light) in (begin..).zip(these.iter()) {
-                self.places[place] = light as u32;
-                self.places[ends * LIGHTS_A_CLUSTER + light] = place as u32;
+            for (place, &light) in these.iter().enumerate() {
+                self.order[k - ends][place] = light as u32;
+                self.places[light] = ((k - ends) * LIGHTS_A_CLUSTER + place) as u32;
             }
             return;
         }
@@ -190,8 +191,11 @@ mod tests {
         let ends = tree.clusters.len() / 2;
         assert_eq!(ends, 32);
         for (i, l) in world.lights.iter().enumerate() {
-            let place = tree.places[ends * LIGHTS_A_CLUSTER + i] as usize;
-            assert_eq!(tree.places[place], i as u32);
+            let place = tree.places[i] as usize;
+            assert_eq!(
+                tree.order[place / LIGHTS_A_CLUSTER][place % LIGHTS_A_CLUSTER],
+                i as u32
+            );
             let mut k = ends + place / LIGHTS_A_CLUSTER;
             while k > 0 {
                 let c = tree.clusters[k];

@@ -6,6 +6,7 @@ mod literal;
 mod near;
 mod preprocess;
 mod rays;
+pub(crate) mod records;
 mod select;
 mod tables;
 pub(crate) mod trees;
@@ -72,7 +73,7 @@ pub(crate) fn shape_tag(geometry: &Geometry) -> u32 {
 }
 
 /// The modules of `shaders/`, in the order in which they are read.
-pub const MODULES: [(&str, &str); 17] = [
+pub const MODULES: [(&str, &str); 18] = [
     ("ray", include_str!("../../shaders/ray.wgsl")),
     ("frame", include_str!("../../shaders/frame.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
@@ -91,6 +92,7 @@ pub const MODULES: [(&str, &str); 17] = [
     ("dielectric", include_str!("../../shaders/dielectric.wgsl")),
     ("phong", include_str!("../../shaders/phong.wgsl")),
     ("surface", include_str!("../../shaders/surface.wgsl")),
+    ("records", include_str!("../../shaders/records.wgsl")),
     ("tree", include_str!("../../shaders/tree.wgsl")),
     ("light_tree", include_str!("../../shaders/light_tree.wgsl")),
 ];
@@ -193,6 +195,8 @@ fn scene_text(
             s,
             "const TRIPS_AT_VERTEX: u32 = {vertex}u;\nconst TRIPS_AT_START: u32 = {start}u;"
         );
+        let parted = trees::Parted::new(world);
+        s.push_str(&records::Records::new(world, &parted).constants(world));
     }
     for (name, text) in MODULES {
         if needs(name, features) {
@@ -215,7 +219,7 @@ pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
     let mut s = String::new();
     tags(&mut s);
     for (name, text) in MODULES {
-        if !["camera", "surface", "tree", "light_tree"].contains(&name) {
+        if !["camera", "surface", "records", "tree", "light_tree"].contains(&name) {
             s.push_str(&preprocess::run(text, &features));
         }
     }
@@ -326,7 +330,7 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
     set("TREE", access == Access::Tree);
     set(
         "LIGHT_TREE",
-        sampling && access == Access::Tree && world.lights.len() > lights::MOST_LOOKED_AT,
+        sampling && access == Access::Tree && records::clustered(world),
     );
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
     set(
@@ -376,7 +380,7 @@ fn needs(name: &str, features: &BTreeSet<&str>) -> bool {
         "mirror" => has("MIRROR") || has("DIELECTRIC") || has("PHONG"),
         "dielectric" => has("DIELECTRIC"),
         "phong" => has("PHONG"),
-        "tree" => has("TREE"),
+        "records" | "tree" => has("TREE"),
         "light_tree" => has("LIGHT_TREE"),
         _ => true,
     }
@@ -397,7 +401,6 @@ fn constants(world: &World, settings: &Settings) -> String {
     constant("CAMERA_MEDIUM", "u32", format!("{}u", c.medium));
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
-    constant("NODES_A_ROW", "u32", format!("{}u", trees::NODES_A_ROW));
     constant("GLANCES", "u32", format!("{GLANCES}u"));
     constant("BLOCK", "u32", format!("{BLOCK}u"));
     constant("REPLICATES", "u32", format!("{REPLICATES}u"));

@@ -37,7 +37,9 @@ fn light_scale(scales: &[f64]) -> String {
 fn fetches(world: &World, access: Access) -> String {
     match access {
         Access::Baked => baked(world),
-        Access::Buffers | Access::Tree => "\
+        // What records.wgsl has.
+        Access::Tree => String::new(),
+        Access::Buffers => "\
 fn surface_at(key: u32) -> Surface {
     return surfaces[key >> 2u];
 }

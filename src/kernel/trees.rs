@@ -7,7 +7,7 @@ use super::rays::{
     Surface, buffer_call, can_block, hull_faces, primitive, shadow_function, surfaces,
 };
 use super::select::BAKED_LIMIT;
-use crate::world::{Bounds, World};
+use crate::world::{Bounds, Tree, World};
 use std::fmt::Write as _;
 
 /// A kind with fewer members is met one by one in a scene that needs trees: as fast up to here.
@@ -16,28 +16,40 @@ const LEAST_IN_TREE: usize = 24;
 /// Nodes that a trip of a walk's loop visits: the trips that older drivers grant go farther, and it costs nothing.
 const VISITS_A_TRIP: usize = 2;
 
-/// Nodes in a row of the texture that holds them.
-pub(crate) const NODES_A_ROW: u32 = 2048;
-
 /// Surfaces that one function meets, and where their tree lies.
 pub(crate) struct Group {
     /// The function.
     pub function: &'static str,
     /// Their numbers, lights first.
     pub numbers: Vec<usize>,
-    /// Number of the node before their tree.
+    /// Number of the record, a multiple of four, four before those of their tree's nodes.
     pub header: usize,
 }
 
 impl Group {
-    /// Number of the node after their tree.
+    /// Number of the record after their tree.
     pub fn end(&self) -> usize {
-        self.header + 2 * self.numbers.len()
+        self.header + 4 * (1 + self.nodes())
     }
 
-    /// Whether leaves hold the surfaces themselves.
+    /// How many nodes are there, number 0 among them.
+    pub fn nodes(&self) -> usize {
+        let all = Tree::numbers(self.numbers.len());
+        if self.spheres() {
+            (all / 2).max(2)
+        } else {
+            all
+        }
+    }
+
+    /// Whether nodes hold the surfaces themselves.
     pub fn spheres(&self) -> bool {
         self.function.starts_with("sphere")
+    }
+
+    /// Whether they are spheres that bound solids.
+    pub fn solids(&self) -> bool {
+        self.function == "sphere_boundary"
     }
 }
 
@@ -77,13 +89,18 @@ impl Parted {
                     numbers,
                     header,
                 };
-                header = group.end() + 1;
+                header = group.end();
                 groups.push(group);
             }
         }
         let in_tree = |s: &Surface| groups.iter().any(|g| g.function == s.function);
         let apart = all.into_iter().filter(|s| !in_tree(s)).collect();
         Self { groups, apart }
+    }
+
+    /// Number of the record after the trees.
+    pub fn end(&self) -> usize {
+        self.groups.last().map_or(0, Group::end)
     }
 }
 
@@ -128,37 +145,60 @@ pub(super) fn walks(world: &World, parted: &Parted, shadows: bool) -> String {
     s
 }
 
-/// The loop of a walk, which goes on while `going_on`: `leaf` for what to do at one.
-fn walk(group: &Group, going_on: &str, leaf: &str) -> String {
-    let (header, end) = (group.header, group.end());
-    let start = format!(
+/// The loop of a walk, which goes on while `going_on`: `leaf` for what to do at surface `i`, whose code is `item`; of spheres
+/// `low` and `radius` are the centre and radius.
+fn walk(group: &Group, going_on: &str, leaf: impl Fn(&str) -> String) -> String {
+    let header = group.header;
+    let mut s = format!(
         "    var hit = first;
-    let slabs = slabs_of(ray, bitcast<f32>(node_low({}u).x));
-    var node = {}u;
-    while node < {end}u && {going_on}trips_left > 0u {{
+    let slabs = slabs_of(ray, bitcast<f32>(record({header}u).x));
+    var at = Place(1u, 0u);
+    while at.node != 0u && {going_on}trips_left > 0u {{
         trips_left -= 1u;
-",
-        header,
-        header + 1
+"
     );
-    let visit = "
-            let a = node_low(node);
-            let b = node_high(node);
-            let leaf = b.w != 0u;
-            let met = meets_box(slabs, bitcast<vec3f>(a.xyz), bitcast<vec3f>(b.xyz), hit.t);
-";
-    let mut s = start;
+    let mut visit = format!(
+        "
+            let place = four_records({}u + at.node);
+            let a = textureLoad(records, place);
+            let b = textureLoad(records, place + vec2u(1u, 0u));
+            let c = textureLoad(records, place + vec2u(2u, 0u));
+            let low_0 = bitcast<vec3f>(a.xyz);
+            let high_0 = bitcast<vec3f>(vec3u(a.w, b.xy));
+            let low_1 = bitcast<vec3f>(vec3u(b.zw, c.x));
+            let high_1 = bitcast<vec3f>(c.yzw);
+",
+        header / 4 + 1
+    );
     if group.spheres() {
-        // A sphere costs no more than a box: both at every visit, and leaves hold the sphere.
+        // A sphere costs no more than a box, and needs no visit of its own.
+        if group.solids() {
+            visit.push_str(
+                "            let solids = textureLoad(records, place + vec2u(3u, 0u));\n",
+            );
+        }
+        for (child, last) in [(0, "b.y"), (1, "c.w")] {
+            let solid = ["solids.x, solids.y", "solids.z, solids.w"][child];
+            let (radius, item) = [("a.w", "b.x"), ("c.y", "c.z")][child];
+            let _ = write!(
+                visit,
+                "            let leaf_{child} = {last} == LEAF;
+            if leaf_{child} {{
+                let item = {item};
+                let i = (item >> 1u) - 1u;
+                let sphere = Sphere(low_{child}, bitcast<f32>({radius}));
+{}
+            }}
+",
+                leaf(solid)
+            );
+        }
         for _ in 0..VISITS_A_TRIP {
             let _ = writeln!(
                 s,
-                "        {{{visit}            let item = b.w;
-            if leaf {{
-                let i = select(0u, (item >> 1u) - 1u, leaf);
-{leaf}
-            }}
-            node = select(a.w, node + 1u, leaf || met);
+                "        {{{visit}            let entry_0 = select(box_entry(slabs, low_0, high_0, hit.t), MISSED, leaf_0);
+            let entry_1 = select(box_entry(slabs, low_1, high_1, hit.t), MISSED, leaf_1);
+            at = onward(at, entry_0, entry_1);
         }}"
             );
         }
@@ -167,55 +207,51 @@ fn walk(group: &Group, going_on: &str, leaf: &str) -> String {
         let _ = writeln!(
             s,
             "        var item = 0u;
-        while node < {end}u && item == 0u && trips_left > 0u {{
-            trips_left -= 1u;{visit}            item = select(0u, b.w, met);
-            node = select(a.w, node + 1u, met);
+        while at.node != 0u && item == 0u && trips_left > 0u {{
+            trips_left -= 1u;{visit}            let leaf = c.w == LEAF;
+            item = select(0u, a.x, leaf);
+            let entry_0 = select(box_entry(slabs, low_0, high_0, hit.t), MISSED, leaf);
+            let entry_1 = select(box_entry(slabs, low_1, high_1, hit.t), MISSED, leaf);
+            at = onward(at, entry_0, entry_1);
         }}
         if item != 0u {{
-                let i = (item >> 1u) - 1u;
-{leaf}
-        }}"
+            let i = (item >> 1u) - 1u;
+            let s = surface_at(i << 2u);
+{}
+        }}",
+            leaf("")
         );
     }
     s + "    }\n    return hit;\n}\n\n"
 }
 
 /// A call of `function` for the surface at a leaf.
-fn call(group: &Group, function: &str, hit: &str) -> String {
+fn call(group: &Group, function: &str, hit: &str, solid: &str) -> String {
     if group.spheres() {
-        let solid = if function.contains("_boundary") {
-            ", b.y, b.z"
+        let solid = if group.solids() {
+            format!(", {solid}")
         } else {
-            ""
+            String::new()
         };
-        format!(
-            "{function}({hit}, ray, Sphere(bitcast<vec3f>(a.xyz), bitcast<f32>(b.x)), 4u * i + 1u, 4u * i{solid})"
-        )
+        format!("{function}({hit}, ray, sphere, 4u * i + 1u, 4u * i{solid})")
     } else {
         buffer_call(function).replacen("(hit,", &format!("({hit},"), 1)
     }
 }
 
-fn fetch(group: &Group) -> &'static str {
-    if group.spheres() {
-        ""
-    } else {
-        "                let s = surfaces[i];\n"
-    }
-}
-
 fn nearest(k: usize, group: &Group) -> String {
     // Trees are walked in any order: among equals the lower key is the earlier.
-    let leaf = format!(
-        "{}                let found = {};
+    let leaf = |solid: &str| {
+        format!(
+            "                let found = {};
                 let take = found.t < hit.t || (found.t == hit.t && found.key < hit.key);
                 hit = Hit(select(hit.t, found.t, take), select(hit.key, found.key, take));",
-        fetch(group),
-        call(group, group.function, "Hit(FAR, NONE)")
-    );
+            call(group, group.function, "Hit(FAR, NONE)", solid)
+        )
+    };
     format!(
         "fn nearest_{k}(ray: Ray, first: Hit) -> Hit {{\n{}",
-        walk(group, "", &leaf)
+        walk(group, "", leaf)
     )
 }
 
@@ -236,14 +272,15 @@ fn any(world: &World, k: usize, group: &Group) -> String {
     } else {
         group.function
     };
-    let leaf = format!(
-        "{}                let found = {};
+    let leaf = |solid: &str| {
+        format!(
+            "                let found = {};
                 hit.key = select(hit.key, found.key, (item & 1u) == 1u);",
-        fetch(group),
-        call(group, function, "hit")
-    );
+            call(group, function, "hit", solid)
+        )
+    };
     format!(
         "fn any_{k}(ray: Ray, first: Hit) -> Hit {{\n{}",
-        walk(group, "hit.key == NONE && ", &leaf)
+        walk(group, "hit.key == NONE && ", leaf)
     )
 }
