@@ -86,10 +86,11 @@ fn light_weight(light: DiskLight, p: vec3f, n: vec3f) -> f32 {
     let inverse = 1.0 / (dot(to, to) + r2);
     let h = dot(light.normal, p) - light.offset;
     let above = fmax(dot(n, to) + light.radius, 0.0);
-    let luminance = dot(light.radiance, vec3f(0.2126, 0.7152, 0.0722));
+    // Half by luminance, half by all channels alike: by luminance alone a blue light would hardly ever be chosen.
+    let brightness = dot(light.radiance, vec3f(0.273, 0.5243, 0.2027));
     let facing = h + light.radius * (r2 * inverse);
     // Factors without unit: a compiler may take them in any order, and products of many lengths leave f32.
     let per_length = light.radius * inverse;
-    return select(0.0, luminance * (facing * per_length) * (above * per_length), h > 0.0);
+    return select(0.0, brightness * (facing * per_length) * (above * per_length), h > 0.0);
 }
 #endif

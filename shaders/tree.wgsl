@@ -6,7 +6,9 @@
 // Of spheres the sixth word is LEAF, and the others are
 //   centre, radius, 2 (number of the surface + 1), + 1 if it can block light;
 // where they bound solids the fourth record has solid and parent of both children. Of other surfaces each has a node of its own,
-// whose twelfth word is LEAF and whose first is that number. Before each tree: farthest from the origin that it
+// whose twelfth word is LEAF and whose first is that number; of disks
+//   centre, radius; normal, offset; that number, face, 0, LEAF.
+// Before each tree: farthest from the origin that it
 // reaches. Node 0 has two boxes that nothing meets: where a walk goes when it is done.
 const LEAF: u32 = 0xffffffffu;
 

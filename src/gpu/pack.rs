@@ -132,6 +132,13 @@ fn pack_trees(world: &World, parted: &trees::Parted, surfaces: &[Surface]) -> Ve
                 (0, _) => [Node::EMPTY; 2],
                 // One alone.
                 (_, Some(_)) if group.spheres() && k == 1 => [*root, Node::EMPTY],
+                (_, Some(item)) if group.disks() => {
+                    let s = &surfaces[number(item)];
+                    let last = |[x, y, z]: [f32; 3], w: f32| [x, y, z, w].map(f32::to_bits);
+                    let (a, b) = (last(s.point, s.radius), last(s.axis, s.offset));
+                    records.extend([a, b, [code(item), s.faces[0], 0, u32::MAX], [0; 4]]);
+                    continue;
+                }
                 (_, Some(item)) => {
                     records.extend([[code(item), 0, 0, 0], [0; 4], [0, 0, 0, u32::MAX], [0; 4]]);
                     continue;

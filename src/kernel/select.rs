@@ -3,8 +3,9 @@
 use crate::engine::DeviceInfo;
 use crate::world::World;
 
-/// Scenes with more surfaces, lights included, have trees: unrolled code costs its compiler about linear time, and past a
-/// few dozen surfaces a walk through a tree is as fast.
+/// Scenes with more surfaces, lights included, have trees. By paths a second the two are even at about a hundred spheres (on
+/// lavapipe 22.3, of 512-bit vectors: 12 million at 8 spheres against 3.6, 6.0 at 48 against 3.7, 3.5 at 96 against 3.5), but
+/// unrolled code costs its compiler 0.7 s at 48 and twice that at 96, which a picture of few samples does not earn back.
 pub const BAKED_LIMIT: usize = 48;
 
 /// Where the surfaces and lights are found.

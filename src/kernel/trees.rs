@@ -10,8 +10,10 @@ use super::select::BAKED_LIMIT;
 use crate::world::{Bounds, Tree, World};
 use std::fmt::Write as _;
 
-/// A kind with fewer members is met one by one in a scene that needs trees: as fast up to here.
-const LEAST_IN_TREE: usize = 24;
+/// Kinds with at least so many members have a tree, the first of these numbers by which no more than [`BAKED_LIMIT`] surfaces
+/// with bounds are left to be met one by one. A walk takes as long as a test of about ninety spheres, or of thirty
+/// cylinders, and what is met one by one is compiled for longer.
+const LEAST_IN_TREE: [usize; 4] = [48, 24, 12, 1];
 
 /// Nodes that a trip of a walk's loop visits: the trips that older drivers grant go farther, and it costs nothing.
 const VISITS_A_TRIP: usize = 2;
@@ -47,6 +49,11 @@ impl Group {
         self.function.starts_with("sphere")
     }
 
+    /// Whether they are disks, whose leaves hold them.
+    pub fn disks(&self) -> bool {
+        self.function == "disk_hit"
+    }
+
     /// Whether they are spheres that bound solids.
     pub fn solids(&self) -> bool {
         self.function == "sphere_boundary"
@@ -66,32 +73,38 @@ impl Parted {
     /// tests reach every part.
     pub fn new(world: &World) -> Self {
         let all = surfaces(world);
+        let bounded = |s: &Surface| s.light || primitive(world, s).geometry.bounds().is_some();
+        let mut kinds: Vec<(&'static str, usize)> = Vec::new();
+        for s in all.iter().filter(|s| bounded(s)) {
+            match kinds.iter_mut().find(|k| k.0 == s.function) {
+                Some(kind) => kind.1 += 1,
+                None => kinds.push((s.function, 1)),
+            }
+        }
+        let left =
+            |least: usize| -> usize { kinds.iter().map(|k| k.1).filter(|n| *n < least).sum() };
         let least = if all.len() <= BAKED_LIMIT {
             1
         } else {
             LEAST_IN_TREE
+                .into_iter()
+                .find(|l| left(*l) <= BAKED_LIMIT)
+                .unwrap_or(1)
         };
-        let mut functions: Vec<&'static str> = Vec::new();
-        let bounded = |s: &Surface| s.light || primitive(world, s).geometry.bounds().is_some();
-        for s in all.iter().filter(|s| bounded(s)) {
-            if !functions.contains(&s.function) {
-                functions.push(s.function);
-            }
-        }
         let mut header = 0;
         let mut groups = Vec::new();
-        for function in functions {
-            let of_kind = all.iter().filter(|s| s.function == function);
-            let numbers: Vec<usize> = of_kind.map(|s| s.number).collect();
-            if numbers.len() >= least {
-                let group = Group {
-                    function,
-                    numbers,
-                    header,
-                };
-                header = group.end();
-                groups.push(group);
+        for (function, count) in kinds {
+            if count < least {
+                continue;
             }
+            let of_kind = all.iter().filter(|s| s.function == function);
+            let group = Group {
+                function,
+                numbers: of_kind.map(|s| s.number).collect(),
+                header,
+            };
+            header = group.end();
+            groups.push(group);
         }
         let in_tree = |s: &Surface| groups.iter().any(|g| g.function == s.function);
         let apart = all.into_iter().filter(|s| !in_tree(s)).collect();
@@ -202,6 +215,24 @@ fn walk(group: &Group, going_on: &str, leaf: impl Fn(&str) -> String) -> String 
         }}"
             );
         }
+    } else if group.disks() {
+        for _ in 0..VISITS_A_TRIP {
+            let _ = writeln!(
+                s,
+                "        {{{visit}            let leaf = c.w == LEAF;
+            if leaf {{
+                let item = c.x;
+                let i = (item >> 1u) - 1u;
+                let disk = Disk(low_0, bitcast<f32>(a.w), bitcast<vec3f>(b.xyz), bitcast<f32>(b.w));
+{}
+            }}
+            let entry_0 = select(box_entry(slabs, low_0, high_0, hit.t), MISSED, leaf);
+            let entry_1 = select(box_entry(slabs, low_1, high_1, hit.t), MISSED, leaf);
+            at = onward(at, entry_0, entry_1);
+        }}",
+                leaf("")
+            );
+        }
     } else {
         // On to the next leaf whose box is met; a masked-off branch would cost its time at every visit.
         let _ = writeln!(
@@ -234,6 +265,8 @@ fn call(group: &Group, function: &str, hit: &str, solid: &str) -> String {
             String::new()
         };
         format!("{function}({hit}, ray, sphere, 4u * i + 1u, 4u * i{solid})")
+    } else if group.disks() {
+        format!("{function}({hit}, ray, disk, c.y, 4u * i)")
     } else {
         buffer_call(function).replacen("(hit,", &format!("({hit},"), 1)
     }
