@@ -272,7 +272,7 @@ pub(crate) mod tests {
             ("shadow_rays is 1 and 2", |p| p.settings.shadow_rays = 2),
             ("seed is 4294967295 and 7", |p| p.settings.seed = 7),
             (
-                "sampler is 3 (of version 0.1.0) and 9 (of version 9)",
+                "sampler is 4 (of version 0.1.0) and 9 (of version 9)",
                 |p| (p.sampler_version, p.version) = (9, "9".into()),
             ),
             (

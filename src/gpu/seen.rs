@@ -135,8 +135,18 @@ mod tests {
             y1: 30,
         };
         let marked = seen.mark(part);
-        let columns: Vec<usize> = (0..20).filter(|x| marked[4 * 20 + x] == 1).collect();
-        assert_eq!((columns[0], columns.len()), (0, 7));
-        assert_eq!(marked.iter().sum::<u32>() as usize, 7 * 10 - 7);
+        let mut counts = [0, 0];
+        for (i, seen) in marked.iter().enumerate() {
+            let [x, y] = [30 + i % 20, 20 + i / 20].map(|k| k as f64);
+            let away = (x + 0.5 - 32.0).hypot(y + 0.5 - 24.0);
+            // A pixel reaches 0.71 from its middle.
+            if away < 3.3 + 0.7 {
+                assert_eq!(*seen, 1, "({x}, {y})");
+            } else if away > 3.3 + 1.5 {
+                assert_eq!(*seen, 0, "({x}, {y})");
+            }
+            counts[*seen as usize] += 1;
+        }
+        assert!(counts[0] > 100 && counts[1] > 20, "{counts:?}");
     }
 }
