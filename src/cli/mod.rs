@@ -7,6 +7,7 @@ mod bench;
 mod check;
 mod compare;
 mod develop;
+mod drivers;
 mod failure;
 mod make_scene;
 mod memory;
@@ -49,7 +50,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
         }
     };
-    prepare_environment(&cli.command);
+    drivers::prepare(&cli.command);
     signals::outlive_size_limits();
     let done = match cli.command {
         Command::Render(args) => render::render(&args),
@@ -70,41 +71,6 @@ pub fn main() -> ExitCode {
             failure.print();
             ExitCode::from(failure.status())
         }
-    }
-}
-
-/// What Vulkan drivers read from the environment; a value that the user has set stays.
-fn prepare_environment(command: &Command) {
-    let set = |name: &str, value: &str| {
-        if std::env::var_os(name).is_none() {
-            // SAFETY: the process has one thread yet, so nobody reads the environment meanwhile.
-            unsafe { std::env::set_var(name, value) };
-        }
-    };
-    // Mesa's layer for choosing among screens complains on stderr where there is no screen.
-    set("NODEVICE_SELECT", "1");
-    // llvmpipe takes 256-bit vectors of its own accord; with these a sample has the same bits and costs a quarter less. Its
-    // disk cache does not tell kernels of one width from those of another, and would give wrong pictures: no cache then.
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512vl")
-        && std::env::var_os("LP_NATIVE_VECTOR_WIDTH").is_none()
-    {
-        set("LP_NATIVE_VECTOR_WIDTH", "512");
-        // SAFETY: as above.
-        unsafe { std::env::set_var("MESA_SHADER_CACHE_DISABLE", "true") };
-    }
-    let talk = match command {
-        Command::Render(args) => Some(args.talk),
-        Command::Selftest(args) => Some(args.talk),
-        Command::Bench(args) => Some(args.talk),
-        _ => None,
-    };
-    if let Some(threads) = talk.and_then(|t| t.threads) {
-        // lavapipe's own.
-        set("LP_NUM_THREADS", &threads.to_string());
     }
 }
 
