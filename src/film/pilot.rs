@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 const SIDE: u32 = 16;
 
 /// Tiles of a picture, about, at most: those of large pictures are larger.
-const TILES: u64 = 1024;
+const TILES: u64 = 256;
 
 /// Share of the samples that is spread evenly.
 const DEFENCE: f64 = 0.25;

@@ -10,7 +10,7 @@ use glam::DVec3;
 use std::fmt::Write as _;
 
 /// Rays into each scene.
-const RAYS: usize = 40_000;
+const RAYS: usize = 170_000;
 
 const BODY: &str = "
     let ray = Ray(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), u32(x[6]), 0u, NO_FACE);

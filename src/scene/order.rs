@@ -7,6 +7,7 @@
 use super::check::may_coincide;
 use super::{Bsdf, Light, Material, Primitive, Scene, Shape};
 use glam::DVec3;
+use rayon::slice::ParallelSliceMut as _;
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, HashMap};
 
@@ -64,10 +65,16 @@ fn compare(a: &Key, b: &Key) -> Ordering {
 }
 
 /// Indices into `list` by the keys of what they stand for.
-fn sorted<T>(list: &[T], key: impl Fn(&T) -> Key) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..list.len()).collect();
-    order.sort_by(|&a, &b| compare(&key(&list[a]), &key(&list[b])));
-    order
+fn sorted<T: Sync>(list: &[T], key: impl Fn(&T) -> Key + Sync) -> Vec<usize> {
+    // The first two numbers of a key tell most things apart, and lie side by side.
+    let mut order: Vec<([f64; 2], usize)> = (list.iter().map(&key).map(|k| [k[0], k[1]]))
+        .zip(0..)
+        .collect();
+    order.par_sort_by(|(p, a), (q, b)| {
+        let first = p[0].total_cmp(&q[0]).then(p[1].total_cmp(&q[1]));
+        first.then_with(|| compare(&key(&list[*a]), &key(&list[*b])))
+    });
+    order.into_iter().map(|(_, i)| i).collect()
 }
 
 /// Of lengths and points first: a direction may come out of its normalisation with other last bits.

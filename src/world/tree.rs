@@ -98,6 +98,13 @@ pub struct Tree {
     pub nodes: Vec<Node>,
 }
 
+/// A numbered box. They are sorted themselves, not their numbers: a million lie too far apart to be looked up.
+#[derive(Clone, Copy)]
+struct Entry {
+    around: Box32,
+    item: u32,
+}
+
 /// A box in f32.
 #[derive(Clone, Copy)]
 struct Box32 {
@@ -147,11 +154,11 @@ const BINS: usize = 16;
 
 /// Parts the items of a node in two, neither of none nor of more than `room`, by the surface area heuristic where that can
 /// tell them apart, else in halves; returns how many are in the first part.
-fn split(boxes: &[Box32], items: &mut [u32], room: usize) -> usize {
+fn split(items: &mut [Entry], room: usize) -> usize {
     let mut best: Option<(f64, usize, f32)> = None;
     let mut longest: (f32, usize) = (0.0, 0);
     for axis in 0..3 {
-        let middle = |i: &u32| boxes[*i as usize].middle(axis);
+        let middle = |e: &Entry| e.around.middle(axis);
         let (low, high) = range(items.iter().map(middle));
         let scale = BINS as f32 / (high - low);
         if high <= low || !scale.is_finite() {
@@ -163,7 +170,7 @@ fn split(boxes: &[Box32], items: &mut [u32], room: usize) -> usize {
         let mut bins = [(Box32::EMPTY, 0usize); BINS];
         for i in items.iter() {
             let bin = &mut bins[bin_of(middle(i), low, scale)];
-            bin.0.add(&boxes[*i as usize]);
+            bin.0.add(&i.around);
             bin.1 += 1;
         }
         // Costs of all that lies right of each border, then of both sides.
@@ -188,16 +195,18 @@ fn split(boxes: &[Box32], items: &mut [u32], room: usize) -> usize {
     }
     let Some((_, axis, border)) = best else {
         let half = items.len() / 2;
-        let middle = |i: &u32| boxes[*i as usize].middle(longest.1);
-        items.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)).then(a.cmp(b)));
+        let middle = |e: &Entry| e.around.middle(longest.1);
+        items.select_nth_unstable_by(half, |a, b| {
+            middle(a).total_cmp(&middle(b)).then(a.item.cmp(&b.item))
+        });
         return half;
     };
-    let middle = |i: u32| boxes[i as usize].middle(axis);
-    let (low, high) = range(items.iter().map(|&i| middle(i)));
+    let middle = |e: &Entry| e.around.middle(axis);
+    let (low, high) = range(items.iter().map(middle));
     let scale = BINS as f32 / (high - low);
     let mut first = 0;
     for k in 0..items.len() {
-        if (bin_of(middle(items[k]), low, scale) as f32) < border {
+        if (bin_of(middle(&items[k]), low, scale) as f32) < border {
             items.swap(k, first);
             first += 1;
         }
@@ -232,8 +241,13 @@ impl Tree {
 
     /// Of boxes with finite corners, numbered in their order: one box a leaf.
     pub fn new(boxes: &[Bounds]) -> Self {
-        let boxes: Vec<Box32> = boxes.iter().map(Box32::outwards).collect();
-        let mut items: Vec<u32> = (0..boxes.len() as u32).collect();
+        let mut items: Vec<Entry> = (0..)
+            .zip(boxes)
+            .map(|(item, b)| Entry {
+                around: Box32::outwards(b),
+                item,
+            })
+            .collect();
         let mut nodes = vec![Node::EMPTY; Self::numbers(boxes.len())];
         let levels = levels(boxes.len());
         // What is still to be made: numbers of nodes, and their items.
@@ -244,15 +258,15 @@ impl Tree {
                 continue;
             }
             let mut around = Box32::EMPTY;
-            these.iter().for_each(|&i| around.add(&boxes[i as usize]));
+            these.iter().for_each(|e| around.add(&e.around));
             nodes[k] = Node {
                 min: around.min,
                 max: around.max,
-                item: (these.len() == 1).then(|| these[0]),
+                item: (these.len() == 1).then(|| these[0].item),
             };
             if these.len() > 1 {
                 let room = 1 << (levels - k.ilog2() - 1);
-                let middle = range.start + split(&boxes, these, room);
+                let middle = range.start + split(these, room);
                 open.extend([(2 * k, range.start..middle), (2 * k + 1, middle..range.end)]);
             }
         }
