@@ -140,7 +140,7 @@ impl Run<'_> {
         let mut check = next_check(mean, self.job.round);
         while self.job.error.is_none()
             && mean >= even(self.job.round)
-            && next_check(check, self.job.round) <= 2 * mean
+            && next_check(check, self.job.round) <= 4 * mean
         {
             check = next_check(check, self.job.round);
         }
