@@ -11,6 +11,7 @@ pub mod measure;
 pub mod plot;
 pub mod record;
 pub mod reference;
+pub mod scaling;
 pub mod summary;
 pub mod table;
 

@@ -7,12 +7,15 @@
 //! | `picture` | scene, engine, sample count and seed |
 //! | `point` | scene, engine and sample count: means over the seeds, each with its standard deviation |
 //! | `report_table` | cell of the report's Figure 9 |
+//! | `scaling` | series, engine and count |
+//! | `crossover` | series and engine that looks at every surface: where the one with trees costs the same |
 //!
 //! Numbers that are not known are null, never NaN.
 
 use super::figure9::Cell;
+use super::scaling::{Crossing, Scaling, Timing};
 use super::summary::{Spread, slope};
-use super::{Entrant, Measurement, Point, Reference, Results};
+use super::{EngineKind, Entrant, Measurement, Point, Reference, Results};
 use serde::Serialize;
 
 /// A line. Keys are the fields' names.
@@ -59,6 +62,31 @@ pub enum Record<'a> {
     },
     Point(Box<PointRecord<'a>>),
     ReportTable(&'a Cell),
+    Scaling {
+        series: &'static str,
+        count: usize,
+        surfaces: usize,
+        engine: &'static str,
+        adapter: Option<&'a str>,
+        driver: Option<&'a str>,
+        resolution: [u32; 2],
+        samples: f64,
+        seconds: Timed,
+        paths: u64,
+        rays: u64,
+        seconds_per_path: f64,
+        paths_per_second: f64,
+    },
+    Crossover {
+        series: &'static str,
+        engines: [&'static str; 2],
+        /// Where both cost the same; null if that is nowhere among the counts of both.
+        even_at: Option<f64>,
+        /// The engine that costs less at all of those.
+        always_cheaper: Option<&'static str>,
+        baked_up_to: Option<usize>,
+        lights_looked_at_up_to: Option<usize>,
+    },
 }
 
 /// A line of type `point`.
@@ -95,6 +123,16 @@ pub struct Ready {
     pub warm_up: f64,
 }
 
+/// Seconds of one count of a series.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[expect(missing_docs, reason = "see Ready and Rendering")]
+pub struct Timed {
+    pub compile: f64,
+    pub warm_up: f64,
+    pub render: f64,
+    pub read_back: f64,
+}
+
 /// Seconds of a picture.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub struct Rendering<T> {
@@ -119,10 +157,60 @@ pub fn lines(results: &Results) -> String {
     text
 }
 
+/// The lines about one series.
+pub fn scaling_lines(scaling: &Scaling) -> String {
+    let timings = scaling.timings.iter().map(|t| timing(scaling, t));
+    let crossings = scaling.crossings();
+    let crossings = crossings.iter().map(|(e, c)| crossover(scaling, *e, *c));
+    timings.chain(crossings).map(|r| line(&r)).collect()
+}
+
 /// A record and a line break.
 pub fn line(record: &Record) -> String {
     // Strings, numbers and fixed keys: nothing that could fail. serde_json writes what is not finite as null.
     serde_json::to_string(record).expect("a record is plain data") + "\n"
+}
+
+fn timing<'a>(s: &'a Scaling, t: &Timing) -> Record<'a> {
+    let device = s.engines.iter().find(|(kind, _)| *kind == t.engine);
+    let device = device.and_then(|(_, device)| device.as_ref());
+    Record::Scaling {
+        series: s.series.name(),
+        count: t.count,
+        surfaces: t.surfaces,
+        engine: t.engine.name(),
+        adapter: device.map(|d| d.name.as_str()),
+        driver: device.map(|d| d.driver.as_str()),
+        resolution: s.size,
+        samples: t.samples,
+        seconds: Timed {
+            compile: t.compile_seconds,
+            warm_up: t.warm_up_seconds,
+            render: t.seconds,
+            read_back: t.read_back_seconds,
+        },
+        paths: t.counters.paths,
+        rays: t.counters.rays,
+        seconds_per_path: t.seconds_per_path(),
+        paths_per_second: 1.0 / t.seconds_per_path(),
+    }
+}
+
+fn crossover(s: &Scaling, engine: EngineKind, crossing: Crossing) -> Record<'static> {
+    let engines = [engine.name(), EngineKind::GpuTree.name()];
+    let (even_at, always_cheaper) = match crossing {
+        Crossing::At(n) => (Some(n), None),
+        Crossing::Beyond(_) => (None, Some(engines[0])),
+        Crossing::Before(_) => (None, Some(engines[1])),
+    };
+    Record::Crossover {
+        series: s.series.name(),
+        engines,
+        even_at,
+        always_cheaper,
+        baked_up_to: s.baked_up_to(),
+        lights_looked_at_up_to: s.looked_at_up_to(),
+    }
 }
 
 fn reference<'a>(r: &'a Results, reference: &'a Reference) -> Record<'a> {
@@ -202,4 +290,28 @@ fn point<'a>(r: &'a Results, p: &Point) -> Record<'a> {
         efficiency: p.efficiency,
         ratio: p.ratio,
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scaling;
+    use super::*;
+    use serde_json::Value;
+
+    #[test]
+    fn a_series_has_a_line_for_each_count_and_one_for_each_crossing() {
+        let text = scaling_lines(&scaling::tests::scaling());
+        let lines: Vec<Value> = text
+            .lines()
+            .map(|l| serde_json::from_str(l).expect("JSON"))
+            .collect();
+        assert_eq!(lines.len(), 9 + 12 + 1);
+        assert_eq!(lines[0]["type"], "scaling");
+        assert_eq!(lines[0]["seconds_per_path"], 10e-9);
+        let last = &lines[21];
+        assert_eq!(last["type"], "crossover");
+        assert!((last["even_at"].as_f64().expect("a number") - 50.0).abs() < 1e-9);
+        assert_eq!(last["baked_up_to"], 45);
+        assert!(last["lights_looked_at_up_to"].is_null());
+    }
 }

@@ -5,14 +5,18 @@ use super::summary::{Spread, millions, slope};
 use super::{EngineKind, Point, Results};
 
 /// Columns of text, the first one aligned left, the others right; but what stands under `on` is left too.
-struct Columns(Vec<Vec<String>>);
+pub(super) struct Columns(Vec<Vec<String>>);
 
 impl Columns {
-    fn new(head: &[&str]) -> Self {
+    pub(super) fn new(head: &[&str]) -> Self {
         Self(vec![head.iter().map(|&s| s.into()).collect()])
     }
 
-    fn text(&self) -> String {
+    pub(super) fn push(&mut self, row: Vec<String>) {
+        self.0.push(row);
+    }
+
+    pub(super) fn text(&self) -> String {
         let width = |c: usize| {
             let cells = self.0.iter().filter_map(|row| row.get(c));
             cells.map(|s| s.chars().count()).max().unwrap_or(0)
@@ -95,7 +99,7 @@ fn engines(results: &Results) -> String {
     let mut columns = Columns::new(&["engine", "compile, s", "warm-up, s", "slope", "on"]);
     for e in &results.entrants {
         let slope = slope(e.kind, &results.measurements);
-        columns.0.push(vec![
+        columns.push(vec![
             e.kind.name().into(),
             format!("{:.2}", e.compile_seconds),
             format!("{:.2}", e.warm_up_seconds),
@@ -120,7 +124,7 @@ fn speed(points: &[Point]) -> String {
         "rays/path",
     ]);
     for p in points {
-        columns.0.push(vec![
+        columns.push(vec![
             p.engine.name().into(),
             p.samples.to_string(),
             cell(p.seconds),
@@ -149,7 +153,7 @@ fn errors(points: &[Point]) -> String {
     ]);
     let share = |s: Option<Spread>| s.map_or("-".into(), |s| with_spread(percent(s.mean), s));
     for p in points {
-        columns.0.push(vec![
+        columns.push(vec![
             p.engine.name().into(),
             p.samples.to_string(),
             cell(p.mse),
@@ -181,7 +185,7 @@ pub fn figure9(engine: EngineKind, cells: &[Cell]) -> String {
             let seconds = cell.and_then(|c| c.seconds);
             row.push(seconds.map_or(String::new(), number));
         }
-        columns.0.push(row);
+        columns.push(row);
     }
     columns.text()
 }
@@ -207,7 +211,7 @@ fn two_digits(x: f64) -> String {
 }
 
 /// Three digits, with an exponent where that is shorter.
-fn number(x: f64) -> String {
+pub(super) fn number(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
     }
@@ -253,7 +257,7 @@ mod tests {
     #[test]
     fn columns_stand_under_their_names() {
         let mut c = Columns::new(&["engine", "x"]);
-        c.0.push(vec!["cpu".into(), "±10".into()]);
+        c.push(vec!["cpu".into(), "±10".into()]);
         assert_eq!(c.text(), "engine    x\ncpu     ±10\n");
     }
 }

@@ -10,7 +10,7 @@ pub(crate) const LIGHTS_A_CLUSTER: usize = 4;
 
 /// Scenes with more lights choose among them by a tree: a look at every light for every choice is the better choice, but
 /// costs more and more.
-pub(super) const MOST_LOOKED_AT: usize = 48;
+pub const MOST_LOOKED_AT: usize = 48;
 
 /// A cluster, as the kernel reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

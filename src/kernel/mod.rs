@@ -11,6 +11,7 @@ mod select;
 mod tables;
 pub(crate) mod trees;
 
+pub use lights::MOST_LOOKED_AT;
 pub use select::{Access, BAKED_LIMIT};
 
 use crate::film::{BLOCK, REPLICATES};

@@ -1,7 +1,10 @@
 //! Scenes of many things, made by rule: a sunflower of spheres, and a hall of lamps.
 
+use super::parse::parse_with_rows;
+use super::{Diagnostic, Scene};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// Larger scenes keep their many things in a file of rows.
 pub const MOST_IN_TABLES: usize = 200;
@@ -16,6 +19,13 @@ pub struct Generated {
     pub scene: String,
     /// Comma-separated rows.
     pub rows: Option<String>,
+}
+
+impl Generated {
+    /// The scene itself; `path` names it in messages.
+    pub fn parse(&self, path: &Path) -> Result<Scene, Vec<Diagnostic>> {
+        parse_with_rows(path, &self.scene, self.rows.as_deref())
+    }
 }
 
 /// Uniform numbers in [0, 1), one for each of `count` things and purposes [Steele2014].
@@ -254,10 +264,11 @@ mod tests {
             let many = make(MOST_IN_TABLES + 1, 3, "x.csv");
             std::fs::write(folder.path().join("x.csv"), many.rows.expect("rows")).expect("written");
             let from_rows = parse_str(&folder.path().join("x.toml"), &many.scene).expect("a scene");
-            let hash = |s: &crate::scene::Scene| {
-                scene_hash(s, &Settings::resolve(s, &Overrides::default()))
-            };
-            assert_eq!(hash(&from_rows), hash(&from_rows.clone()));
+            let hash = |s: &Scene| scene_hash(s, &Settings::resolve(s, &Overrides::default()));
+            let in_memory = make(MOST_IN_TABLES + 1, 3, "x.csv")
+                .parse("x.toml".as_ref())
+                .expect("a scene");
+            assert_eq!(hash(&from_rows), hash(&in_memory));
             assert_ne!(hash(&from_rows), hash(&scene));
         }
     }

@@ -7,6 +7,7 @@ use super::schema;
 use super::source::{Faults, Source, quoted, suggestion};
 use super::value::{Text, Value};
 use super::{Bsdf, Diagnostic, Light, Material, Primitive, RenderHints, Scene};
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
@@ -97,7 +98,22 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
 
 /// The scene in `text`; `path` names it in messages. There is at least one message in an error.
 pub fn parse_str(path: &Path, text: &str) -> Result<Scene, Vec<Diagnostic>> {
-    let source = Source::new(path, text.strip_prefix('\u{feff}').unwrap_or(text));
+    parse(Source::new(
+        path,
+        text.strip_prefix('\u{feff}').unwrap_or(text),
+    ))
+}
+
+/// The same where the one file of rows that `text` names is in memory too.
+pub(super) fn parse_with_rows(
+    path: &Path,
+    text: &str,
+    rows: Option<&str>,
+) -> Result<Scene, Vec<Diagnostic>> {
+    parse(Source::new(path, text).with_rows(rows))
+}
+
+fn parse(source: Source) -> Result<Scene, Vec<Diagnostic>> {
     let mut faults = Faults::new();
     let scene = syntax(&source, &mut faults).and_then(|root| scene(&source, &root, &mut faults));
     match scene {
@@ -168,7 +184,7 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
     let mut lights: Vec<Option<Light>> = file.each("light", |t, line| format::light(t, line));
     for more in file.each("lights", |t, line| {
         let name = format::lights(t)?;
-        t.rows(&name, |path| rows::lights(path, line))
+        t.rows(&name, |path, text| rows::lights(path, text, line))
     }) {
         match more {
             Some(more) => lights.extend(more.into_iter().map(Some)),
@@ -318,7 +334,9 @@ fn spheres(
         Some(Ok(material)) => Some(material),
         None => None,
     };
-    t.rows(&name, |path| rows::spheres(path, line, common, find))
+    t.rows(&name, |path, text| {
+        rows::spheres(path, text, line, common, find)
+    })
 }
 
 /// A table of the file that is being read.
@@ -387,7 +405,7 @@ impl<'a, 't> Reader<'a, 't> {
     fn rows<T>(
         &mut self,
         name: &str,
-        read: impl FnOnce(&Path) -> Result<Vec<T>, rows::Wrong>,
+        read: impl FnOnce(&Path, &str) -> Result<Vec<T>, rows::Wrong>,
     ) -> Option<Vec<T>> {
         let path = self
             .source
@@ -395,7 +413,11 @@ impl<'a, 't> Reader<'a, 't> {
             .parent()
             .unwrap_or(Path::new(""))
             .join(name);
-        match read(&path) {
+        let text = match self.source.rows() {
+            Some(text) => Ok(Cow::Borrowed(text)),
+            None => rows::read(&path).map(Cow::Owned),
+        };
+        match text.and_then(|text| read(&path, &text)) {
             Ok(rows) => Some(rows),
             Err(rows::Wrong::File(message)) => {
                 self.refuse("file", format!("cannot read {}: {message}", path.display()));

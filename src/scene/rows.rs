@@ -29,16 +29,16 @@ pub(super) enum Wrong {
     Content(Vec<Diagnostic>),
 }
 
-/// The spheres in a file; `material` finds one by name, or says what is wrong with it, and `common` is that of all if
+/// The spheres in the text of a file; `material` finds one by name, or says what is wrong with it, and `common` is that of all if
 /// there is no such column.
 pub(super) fn spheres(
     path: &Path,
+    text: &str,
     line: usize,
     common: Option<usize>,
     material: impl Fn(&str) -> Result<usize, String>,
 ) -> Result<Vec<Primitive>, Wrong> {
-    let text = read(path)?;
-    let mut rows = Rows::new(path, &text);
+    let mut rows = Rows::new(path, text);
     let optional: &[&str] = if common.is_some() { &[] } else { &[MATERIAL] };
     let columns = rows.header(&SPHERE, optional)?;
     let mut spheres = Vec::new();
@@ -60,10 +60,9 @@ pub(super) fn spheres(
     Ok(spheres)
 }
 
-/// The lights in a file.
-pub(super) fn lights(path: &Path, line: usize) -> Result<Vec<Light>, Wrong> {
-    let text = read(path)?;
-    let mut rows = Rows::new(path, &text);
+/// The lights in the text of a file.
+pub(super) fn lights(path: &Path, text: &str, line: usize) -> Result<Vec<Light>, Wrong> {
+    let mut rows = Rows::new(path, text);
     let c = rows.header(&LIGHT, &[])?;
     let mut lights = Vec::new();
     rows.each(c.len(), |row| {
@@ -79,7 +78,8 @@ pub(super) fn lights(path: &Path, line: usize) -> Result<Vec<Light>, Wrong> {
     Ok(lights)
 }
 
-fn read(path: &Path) -> Result<String, Wrong> {
+/// The text of a file of rows, of at most [`MAX_ROWS_BYTES`].
+pub(super) fn read(path: &Path) -> Result<String, Wrong> {
     let system = |e: std::io::Error| Wrong::File(e.to_string());
     let file = File::open(path).map_err(system)?;
     let mut bytes = Vec::new();
@@ -256,14 +256,7 @@ impl<'a> Row<'a> {
 mod tests {
     use super::*;
 
-    fn temporary(text: &str) -> tempfile::NamedTempFile {
-        let file = tempfile::NamedTempFile::new().expect("a file");
-        std::fs::write(file.path(), text).expect("written");
-        file
-    }
-
     fn faults(text: &str) -> Vec<String> {
-        let file = temporary(text);
         let named = |name: &str| {
             if name == "red" {
                 Ok(7)
@@ -271,7 +264,7 @@ mod tests {
                 Err(format!("no {name}"))
             }
         };
-        match spheres(file.path(), 3, None, named) {
+        match spheres("x.csv".as_ref(), text, 3, None, named) {
             Ok(_) => Vec::new(),
             Err(Wrong::File(message)) => vec![message],
             Err(Wrong::Content(all)) => all
@@ -283,8 +276,8 @@ mod tests {
 
     #[test]
     fn columns_may_stand_in_any_order() {
-        let file = temporary("radius, z,y,x ,material\n 2,3,4,5, red \n\n1e-3,0,-1,+2.5,red\r\n");
-        let all = spheres(file.path(), 3, None, |_| Ok(7))
+        let text = "radius, z,y,x ,material\n 2,3,4,5, red \n\n1e-3,0,-1,+2.5,red\r\n";
+        let all = spheres("x.csv".as_ref(), text, 3, None, |_| Ok(7))
             .ok()
             .expect("spheres");
         let center = DVec3::new(5.0, 4.0, 3.0);
@@ -296,8 +289,8 @@ mod tests {
             }
         );
         assert_eq!((all.len(), all[1].material, all[1].line), (2, 7, 3));
-        let file = temporary("x,y,z,nx,ny,nz,radius,r,g,b\n1,2,3,0,-2,0,0.5,9,8,7\n");
-        let all = lights(file.path(), 3).ok().expect("lights");
+        let text = "x,y,z,nx,ny,nz,radius,r,g,b\n1,2,3,0,-2,0,0.5,9,8,7\n";
+        let all = lights("x.csv".as_ref(), text, 3).ok().expect("lights");
         assert_eq!(
             (all[0].normal, all[0].radiance),
             (DVec3::NEG_Y, DVec3::new(9.0, 8.0, 7.0))

@@ -15,6 +15,8 @@ pub(super) struct Source<'a> {
     text: &'a str,
     /// Byte offset of the start of every line.
     lines: Vec<usize>,
+    /// What any file of rows holds that the text names, if that is in memory.
+    rows: Option<&'a str>,
 }
 
 impl<'a> Source<'a> {
@@ -26,7 +28,18 @@ impl<'a> Source<'a> {
             lines: std::iter::once(0)
                 .chain(starts.map(|(i, _)| i + 1))
                 .collect(),
+            rows: None,
         }
+    }
+
+    /// The same with the file of rows that it names, of which there is one.
+    pub(super) fn with_rows(self, rows: Option<&'a str>) -> Self {
+        Self { rows, ..self }
+    }
+
+    /// The text of the file of rows, if it is in memory.
+    pub(super) fn rows(&self) -> Option<&'a str> {
+        self.rows
     }
 
     pub(super) fn path(&self) -> &'a Path {

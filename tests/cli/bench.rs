@@ -49,6 +49,10 @@ fn bench_refuses_what_it_cannot_do() {
         ),
         ("box.toml --report-table", "cannot be used with"),
         ("--report-table --plot a.svg", "cannot be used with"),
+        ("box.toml --scaling", "cannot be used with"),
+        ("--scaling --reference a.exr", "cannot be used with"),
+        ("--scaling --up-to 0", "0 is not in"),
+        ("box.toml --up-to 8", "cannot be used with"),
     ] {
         bench
             .run(&format!("bench {args}"))
@@ -263,6 +267,83 @@ fn the_report_table_leaves_blank_what_takes_too_long() {
         assert!(rays != 1 || cell["seconds"].as_f64().unwrap() > 0.0);
         assert!(rays != 256 || cell["seconds"].is_null());
     }
+}
+
+#[test]
+fn scaling_shows_the_cost_of_a_path_by_number() {
+    let bench = Bench::new();
+    let args =
+        "bench --scaling --engine cpu,cpu-brute --up-to 5 --size 8x6 --time 400ms --progress none";
+    bench
+        .run(&format!("{args} --json a.jsonl --plot a.svg --plot a.png"))
+        .success()
+        .stdout(
+            says("spheres: 8x6, 3 other surfaces")
+                .and(says("lights: 8x6, 24 other surfaces"))
+                .and(says("ns a path")),
+        );
+    let lines = json_lines(&fs::read(bench.path("a.jsonl")).unwrap());
+    let expected = [
+        "type",
+        "series",
+        "count",
+        "surfaces",
+        "engine",
+        "adapter",
+        "driver",
+        "resolution",
+        "samples",
+        "seconds",
+        "paths",
+        "rays",
+        "seconds_per_path",
+        "paths_per_second",
+    ];
+    let points = of_type(&lines, "scaling");
+    assert_eq!(
+        lines.len(),
+        points.len(),
+        "no line crosses that of gpu-tree"
+    );
+    for (series, others) in [("spheres", 3), ("lights", 24)] {
+        for engine in ["cpu", "cpu-brute"] {
+            let mine = points
+                .iter()
+                .filter(|p| p["series"] == series && p["engine"] == engine);
+            let counts: Vec<u64> = mine.map(|p| p["count"].as_u64().unwrap()).collect();
+            // On a machine that does much else a line may end early.
+            assert!(!counts.is_empty(), "{series}, {engine}");
+            assert!([1, 2, 4, 5].starts_with(&counts), "{counts:?}");
+        }
+        for p in points.iter().filter(|p| p["series"] == series) {
+            assert_eq!(keys(p), BTreeSet::from(expected));
+            assert_eq!(
+                p["surfaces"].as_u64(),
+                p["count"].as_u64().map(|n| n + others)
+            );
+            assert!(p["seconds"]["warm_up"].as_f64().unwrap() > 0.0);
+            assert_eq!(p["seconds"]["compile"], 0.0);
+            assert!(p["seconds_per_path"].as_f64().unwrap() > 0.0);
+            assert!(p["paths"].as_u64().unwrap() >= 8 * 6);
+        }
+    }
+    let svg = fs::read_to_string(bench.path("a.svg")).unwrap();
+    assert!(svg.contains("cpu-brute") && svg.contains("nanoseconds a path"));
+    let png = fs::read(bench.path("a.png")).unwrap();
+    assert!(png.starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn an_interrupted_scaling_shows_what_there_is() {
+    let bench = Bench::new();
+    let script = "timeout --foreground --preserve-status -s INT 3 \"$0\" bench --scaling --engine cpu --size 8x6 \
+                  --time 10s --up-to 300 --json a.jsonl --progress none > table";
+    assert_eq!(bench.shell(&[], script), 130);
+    let table = fs::read_to_string(bench.path("table")).unwrap();
+    assert!(table.contains("spheres: 8x6"), "{table}");
+    let lines = json_lines(&fs::read(bench.path("a.jsonl")).unwrap());
+    // A tenth of the time is that of one sphere.
+    assert!(!lines.is_empty(), "{table}");
 }
 
 #[test]

@@ -22,6 +22,7 @@ Examples:
   etendue bench scenes/*.toml --engine gpu-baked,gpu-buffers --time 1m --plot speed.svg --plot speed.png
   etendue bench scene.toml --reference long.npz --seeds 8 --json results.jsonl
   etendue bench --report-table --time 10m
+  etendue bench --scaling --plot scaling.svg --json scaling.jsonl
 
 Exit status: 0 measured, 2 bad command line or input, 3 no adapter or it failed, 4 a file can't be read or written,
 130 or 143 interrupted, after showing what was measured.")]
@@ -29,17 +30,17 @@ pub struct BenchArgs {
     /// Scene files
     #[arg(
         value_name = "SCENE",
-        required_unless_present = "report_table",
-        conflicts_with = "report_table"
+        required_unless_present_any = ["report_table", "scaling"],
+        conflicts_with_all = ["report_table", "scaling"]
     )]
     pub scenes: Vec<PathBuf>,
     /// Engines, by commas or repeated: gpu-baked (scene values in the kernel's text), gpu-buffers, gpu-tree, cpu (the f64
     /// reference), cpu-brute (the same without light sampling); ratios are to the first
-    /// [default: what render would take, and without --report-table cpu]
+    /// [default: what render would take, and without --report-table cpu; with --scaling gpu-baked,gpu-buffers,gpu-tree]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = engine)]
     pub engine: Vec<EngineKind>,
-    /// Rendering time of each engine and scene, over all its pictures; its pictures of one sample are made whatever they
-    /// take [default: 20s, with --report-table 4m]
+    /// Rendering time of each engine and scene (with --scaling, series), over all its pictures; its pictures of one sample
+    /// are made whatever they take [default: 20s, with --report-table 4m]
     #[arg(long, value_name = "TIME", value_parser = values::duration)]
     pub time: Option<Duration>,
     /// Pictures of each sample count, each with another seed
@@ -52,6 +53,14 @@ pub struct BenchArgs {
     /// light, both with several lights, and three materials
     #[arg(long, conflicts_with_all = ["reference", "plot"])]
     pub report_table: bool,
+    /// Seconds a path against the number of spheres and of lights instead, 1, 2, 4, ..., and the number from which a tree
+    /// costs less than a look at each. An engine goes no further when its compiler takes seconds or its --time is over
+    #[arg(long, conflicts_with_all = ["report_table", "reference", "reference_spp", "cache", "seeds"])]
+    pub scaling: bool,
+    /// The most spheres, and lights, of --scaling
+    #[arg(long, value_name = "N", default_value_t = 100_000, conflicts_with_all = ["scenes", "report_table"],
+          value_parser = clap::value_parser!(u32).range(1..=5_000_000))]
+    pub up_to: u32,
 
     /// Hold pictures against this one, an .exr or a film of the same scene, instead of making one
     #[arg(long, value_name = "FILE", help_heading = "Reference")]
@@ -67,7 +76,7 @@ pub struct BenchArgs {
     /// Write what was measured as JSON lines; - is stdout, and the tables then go to stderr
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
-    /// Draw error against seconds, .svg or .png; repeatable
+    /// Draw error against seconds (with --scaling, seconds a path against number), .svg or .png; repeatable
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub plot: Vec<PathBuf>,
 

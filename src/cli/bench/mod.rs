@@ -2,13 +2,14 @@
 
 pub mod args;
 mod report_table;
+mod scaling;
 
 use super::args::Backend;
 use super::failure::Failure;
 use super::progress::Progress;
 use super::signals::Signals;
 use super::{backend, memory, say};
-use crate::bench::plot::{self, Panel};
+use crate::bench::plot::{self, ErrorPanel, Panel};
 use crate::bench::{
     Contender, EngineKind, Entrant, Plan, Reference, Results, Unready, mean_path_length, measure,
     record, reference, table,
@@ -58,6 +59,8 @@ pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let mut panels = Vec::new();
     let ended = if args.report_table {
         bench.report_table()
+    } else if args.scaling {
+        bench.scaling(&mut panels)
     } else {
         bench.scenes(&scenes, &mut panels)
     };
@@ -187,7 +190,7 @@ impl Bench<'_> {
         );
         self.show(&table::text(&results))?;
         self.json += &record::lines(&results);
-        panels.push(Panel::new(&results));
+        panels.push(Panel::Error(ErrorPanel::new(&results)));
         match ended {
             Ok(true) => Ok(()),
             Ok(false) => Err(self.interrupted()),
@@ -209,13 +212,7 @@ impl Bench<'_> {
             }
             kinds.splice(0..0, usual);
         }
-        let mut once: Vec<EngineKind> = Vec::new();
-        for kind in kinds {
-            if !once.contains(&kind) {
-                once.push(kind);
-            }
-        }
-        once
+        once(kinds)
     }
 
     fn contender(
@@ -314,4 +311,15 @@ impl Bench<'_> {
             e => e.into(),
         })
     }
+}
+
+/// Each of them once, where it stood first.
+fn once(kinds: Vec<EngineKind>) -> Vec<EngineKind> {
+    let mut once: Vec<EngineKind> = Vec::new();
+    for kind in kinds {
+        if !once.contains(&kind) {
+            once.push(kind);
+        }
+    }
+    once
 }

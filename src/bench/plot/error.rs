@@ -1,0 +1,230 @@
+//! Error against seconds, a panel for each scene.
+
+use super::Drawn;
+use super::chart::{Axes, Pen, plain, range};
+use crate::bench::summary::Point;
+use crate::bench::{EngineKind, Results};
+use plotters::chart::SeriesLabelPosition;
+use plotters::coord::Shift;
+use plotters::drawing::DrawingArea;
+use plotters::element::PathElement;
+use plotters::prelude::DrawingBackend;
+use std::path::Path;
+
+/// What is drawn of one scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorPanel {
+    /// Above it.
+    pub title: String,
+    /// A line for each engine.
+    pub curves: Vec<Curve>,
+    /// Relative error of the reference itself.
+    pub floor: Option<f64>,
+}
+
+/// One engine's errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    /// Whose.
+    pub engine: EngineKind,
+    /// Seconds, relative error, and its standard deviation over seeds; all but the last above 0.
+    pub points: Vec<[f64; 3]>,
+}
+
+impl ErrorPanel {
+    /// What there is to draw of these results.
+    pub fn new(results: &Results) -> Self {
+        let points = results.points();
+        let curve = |engine: EngineKind| {
+            let drawn = |p: &Point| {
+                let error = p.true_relative_error?;
+                Some([p.seconds.mean, error.mean, error.sd.unwrap_or(0.0)])
+            };
+            Curve {
+                engine,
+                points: points
+                    .iter()
+                    .filter(|p| p.engine == engine)
+                    .filter_map(drawn)
+                    .filter(|p| p[0] > 0.0 && p[1] > 0.0)
+                    .collect(),
+            }
+        };
+        let name = Path::new(&results.scene).file_stem();
+        Self {
+            title: name.map_or(results.scene.clone(), |n| n.to_string_lossy().into()),
+            curves: results.engines().into_iter().map(curve).collect(),
+            floor: results.reference.truth.noise_floor().filter(|&f| f > 0.0),
+        }
+    }
+
+    /// Least and greatest seconds and errors, widened to leave room; 1 around nothing.
+    fn ranges(&self) -> [[f64; 2]; 2] {
+        let points = || self.curves.iter().flat_map(|c| &c.points);
+        let x = range(points().map(|p| p[0]), [0.7, 1.4]);
+        let ends = |p: &[f64; 3]| [p[1] + p[2], (p[1] - p[2]).max(0.5 * p[1])];
+        let y = range(points().flat_map(ends).chain(self.floor), [0.8, 1.6]);
+        [x, y]
+    }
+}
+
+impl ErrorPanel {
+    /// Where the legend hides fewer points: errors fall to the right, so two corners are mostly free.
+    fn free_corner(&self) -> SeriesLabelPosition {
+        let [x, y] = self.ranges();
+        let share = |v: f64, [a, b]: [f64; 2]| (v / a).ln() / (b / a).ln();
+        let (mut left, mut right) = (0, 0);
+        for p in self.curves.iter().flat_map(|c| &c.points) {
+            let (x, y) = (share(p[0], x), share(p[1], y));
+            left += u32::from(x < 0.4 && y < 0.4);
+            right += u32::from(x > 0.6 && y > 0.6);
+        }
+        if right < left {
+            SeriesLabelPosition::UpperRight
+        } else {
+            SeriesLabelPosition::LowerLeft
+        }
+    }
+}
+
+impl ErrorPanel {
+    /// Draws it.
+    pub(super) fn draw<DB: DrawingBackend>(
+        &self,
+        area: &DrawingArea<DB, Shift>,
+        pen: Pen,
+    ) -> Drawn<DB> {
+        let [x, y] = self.ranges();
+        let [[x0, x1], [y0, y1]] = [x, y];
+        let mut chart = pen.axes(
+            area,
+            &Axes {
+                title: &self.title,
+                names: ["seconds", "relative error"],
+                ranges: [x, y],
+                y_label: |y| format!("{} %", plain(y * 100.0)),
+            },
+        )?;
+        // The guide lies below the end of the first curve, where costs besides the samples matter least.
+        let last = self.curves.iter().find_map(|c| c.points.last());
+        if let Some([x, y, _]) = last {
+            let low = 0.7 * y;
+            let guide = |t: f64| (t, low * (t / x).powf(-0.5));
+            // What leaves the chart is not cut off but bent along its edge.
+            let at = |error: f64| x * (low / error).powi(2);
+            let ends = [x0.max(at(y1)), x1.min(at(y0))].map(guide);
+            pen.dashes(&mut chart, ends, [6.0, 4.0], [1.0, 0.5], "slope -1/2")?;
+        }
+        if let Some(floor) = self.floor {
+            let ends = [(x0, floor), (x1, floor)];
+            pen.dashes(
+                &mut chart,
+                ends,
+                [2.0, 3.0],
+                [1.0, 0.0],
+                "noise of the reference",
+            )?;
+        }
+        for (i, curve) in self.curves.iter().enumerate() {
+            let thin = pen.line(Pen::colour(i), 1.2);
+            chart.draw_series(curve.points.iter().map(|&[x, y, sd]| {
+                PathElement::new([(x, (y - sd).max(0.5 * y)), (x, y + sd)], thin)
+            }))?;
+            let points: Vec<(f64, f64)> = curve.points.iter().map(|p| (p[0], p[1])).collect();
+            pen.curve(&mut chart, i, curve.engine.name(), &points)?;
+        }
+        pen.legend(&mut chart, self.free_corner())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Format, Panel, svg, write};
+    use super::*;
+    use std::io;
+
+    fn panel(floor: Option<f64>) -> ErrorPanel {
+        let curve = |engine, cost: f64, error: f64| Curve {
+            engine,
+            points: (0..7)
+                .map(|k| {
+                    let n = f64::from(1 << k);
+                    [cost * n, error / n.sqrt(), 0.03 * error / n.sqrt()]
+                })
+                .collect(),
+        };
+        ErrorPanel {
+            title: "synthetic".into(),
+            curves: vec![
+                curve(EngineKind::GpuBaked, 0.05, 0.8),
+                curve(EngineKind::GpuBuffers, 0.11, 0.8),
+                curve(EngineKind::Cpu, 0.5, 0.78),
+                curve(EngineKind::CpuBrute, 0.4, 5.0),
+            ],
+            floor,
+        }
+    }
+
+    /// With `ETENDUE_KEEP_PLOTS` a folder, the pictures stay there to be looked at.
+    #[test]
+    fn plots_are_written_and_say_what_is_in_them() {
+        let temporary = tempfile::tempdir().unwrap();
+        let kept = std::env::var_os("ETENDUE_KEEP_PLOTS");
+        let dir = kept.map_or(temporary.path().to_owned(), Into::into);
+        let panels = [panel(Some(0.02)), panel(None)].map(Panel::Error);
+        let svg = dir.join("plot.svg");
+        write(&svg, Format::Svg, &panels).unwrap();
+        let text = std::fs::read_to_string(&svg).unwrap();
+        for word in [
+            "<svg",
+            "gpu-baked",
+            "cpu-brute",
+            "slope -1/2",
+            "noise of the reference",
+            "seconds",
+            "relative error",
+            "synthetic",
+        ] {
+            assert!(text.contains(word), "no {word}");
+        }
+        let png = dir.join("plot.png");
+        write(&png, Format::Png, &panels).unwrap();
+        let mut reader = png::Decoder::new(io::BufReader::new(std::fs::File::open(&png).unwrap()))
+            .read_info()
+            .unwrap();
+        let mut data = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut data).unwrap();
+        assert_eq!([info.width, info.height], [2 * 560 * 2, 440 * 2]);
+        // Text is there: dark pixels in the strip left of the first panel's axis, where nothing but labels is.
+        let dark = |x: usize, y: usize| data[(y * info.width as usize + x) * 3] < 100;
+        let labels = (0..120usize).flat_map(|x| (100..700usize).map(move |y| (x, y)));
+        assert!(labels.filter(|&(x, y)| dark(x, y)).count() > 500);
+    }
+
+    #[test]
+    fn nothing_measured_is_an_empty_plot() {
+        let empty = ErrorPanel {
+            title: "none".into(),
+            curves: vec![Curve {
+                engine: EngineKind::Cpu,
+                points: Vec::new(),
+            }],
+            floor: None,
+        };
+        assert!(svg(&[Panel::Error(empty)]).is_ok());
+        assert!(svg(&[]).is_ok());
+    }
+
+    #[test]
+    fn the_legend_hides_few_points() {
+        let corner = |middle: [f64; 3]| {
+            let mut p = panel(None);
+            p.curves.truncate(1);
+            p.curves[0].points = vec![[0.1, 1.0, 0.0], middle, [1.0, 0.1, 0.0]];
+            p.free_corner()
+        };
+        let [fast, slow] = [[0.12, 0.11, 0.0], [0.9, 0.9, 0.0]].map(corner);
+        assert!(matches!(fast, SeriesLabelPosition::UpperRight));
+        assert!(matches!(slow, SeriesLabelPosition::LowerLeft));
+    }
+}
