@@ -98,7 +98,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let mut progress = Progress::new(&args.talk);
     let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &signals.stop);
     let ended = run.go(|film, tally| {
-        progress.show(tally);
+        progress.show(film, tally);
         saver.meanwhile(film, tally, &progress);
         Ok::<(), Failure>(())
     });

@@ -27,6 +27,20 @@ fn time_and_error_end_a_run() {
         .stdout(says("\"stop_reason\": \"spp\""));
 }
 
+/// An error that no run reaches leaves the other conditions as they are.
+#[test]
+fn time_holds_whatever_the_error() {
+    let bench = Bench::new();
+    for error in ["1e-8", "1e-20", "1e-100", "1e-320"] {
+        bench
+            .run(&format!(
+                "render box.toml --backend cpu --error {error} --time 300ms -o a.exr --report -"
+            ))
+            .success()
+            .stdout(says("\"stop_reason\": \"time\""));
+    }
+}
+
 /// The first signal's work can last: here on a report to a pipe that nobody reads. A second signal ends it.
 #[cfg(unix)]
 #[test]
