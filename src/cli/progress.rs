@@ -121,6 +121,13 @@ impl Progress {
     }
 }
 
+/// A command that fails leaves no bar behind.
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
 /// The picture's relative error as it was looked at last.
 #[derive(Default)]
 struct Looks {
