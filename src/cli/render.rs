@@ -348,9 +348,9 @@ fn warn(settings: &Settings, counters: &Counters, film: &Film, provenance: &Prov
         && film.heavy_tail().is_some_and(|tail| tail.unsafe_mean)
     {
         say!(
-            "warning: the true error may be above the stated {}, often by a fifth or more: much of the noise is in rare \
-             bright samples, such as light that glass or mirrors focus makes, and few of them have been met yet; more \
-             samples will tell (--spp, --time)",
+            "warning: the true error may be above the stated {}, often by a fifth or more: much of it lies in rare bright samples \
+             (light that glass or mirrors focus, for one), of which few have been met yet; more samples will tell (--spp, \
+             --time)",
             percent(error)
         );
     }
