@@ -5,7 +5,7 @@ use crate::film::Film;
 use crate::scene::Scene;
 use crate::scene::hash::scene_hash;
 use crate::settings::{Integrator, LightParts, Settings};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 /// Changes whenever a sample of the same number and seed gets another value.
 pub const SAMPLER_VERSION: u32 = 4;
@@ -27,8 +27,9 @@ pub struct Provenance {
     pub scene_text: String,
     /// Everything else that decides the samples.
     pub settings: Settings,
-    /// Samples of the covered pixel that has the fewest.
-    pub samples: u64,
+    /// Samples of a covered pixel on average.
+    #[serde(serialize_with = "count_or_mean")]
+    pub samples: f64,
     /// Independent replicates behind the error of the covered pixel that has the fewest.
     pub replicates: u32,
     /// What it was rendered on, in order of first use.
@@ -63,7 +64,7 @@ impl Provenance {
             scene_hash: scene_hash(scene, settings),
             scene_text: scene_text.into(),
             settings: settings.clone(),
-            samples: 0,
+            samples: 0.0,
             replicates: 0,
             devices: Vec::new(),
             seconds: 0.0,
@@ -85,7 +86,7 @@ impl Provenance {
 
     /// Takes samples, replicates and relative error from the film as it now stands.
     pub fn describe(&mut self, film: &Film) {
-        self.samples = film.coverage.samples().0;
+        self.samples = film.coverage.mean();
         self.replicates = film.replicates().0;
         self.relative_error = film.relative_error();
     }
@@ -181,6 +182,15 @@ impl Provenance {
     }
 }
 
+/// A mean of counts for JSON: 256 where it is whole, not 256.0.
+pub(crate) fn count_or_mean<S: Serializer>(mean: &f64, to: S) -> Result<S::Ok, S::Error> {
+    if mean.fract() == 0.0 && (0.0..=u32::MAX.into()).contains(mean) {
+        to.serialize_u64(*mean as u64)
+    } else {
+        to.serialize_f64(*mean)
+    }
+}
+
 /// `emitted,direct,indirect` or what is kept of it, as `--light` reads it.
 pub fn light_name(light: LightParts) -> String {
     let parts = [
@@ -223,7 +233,7 @@ pub(crate) mod tests {
                 light: LightParts::ALL,
                 integrator: Integrator::Path,
             },
-            samples: 0,
+            samples: 0.0,
             replicates: 0,
             devices: Vec::new(),
             seconds: 0.0,
@@ -313,7 +323,14 @@ pub(crate) mod tests {
     fn json_keeps_everything() {
         let mut p = example([4, 3]);
         p.relative_error = Some(0.015625);
-        let text = serde_json::to_string(&p).unwrap();
-        assert_eq!(serde_json::from_str::<Provenance>(&text).unwrap(), p);
+        for (samples, written) in [(256.0, "256,"), (255.125, "255.125,"), (0.0, "0,")] {
+            p.samples = samples;
+            let text = serde_json::to_string(&p).unwrap();
+            assert!(
+                text.contains(&format!("\"samples\":{written}\"replicates\"")),
+                "{text}"
+            );
+            assert_eq!(serde_json::from_str::<Provenance>(&text).unwrap(), p);
+        }
     }
 }

@@ -21,14 +21,12 @@ pub const CALL: Duration = Duration::from_millis(1000);
 /// Factor between the sample counts at which the error is looked at when it may end the run.
 const CHECK_FACTOR: f64 = 1.25;
 
-/// The same when it is only shown: every look ends a pass, and short passes make a software adapter's lanes wait.
-const SHOWN_CHECK_FACTOR: f64 = 4.0;
-
 /// The fewest samples at which the error may end a run.
 const MIN_CHECKED_SAMPLES: u64 = 16;
 
-/// The fewest samples at which it is shown.
-const MIN_SHOWN_SAMPLES: u64 = 64;
+/// The first pass over all tiles ends after so many samples: a picture to follow then soon has no holes. Shorter passes
+/// would make a software adapter's lanes wait.
+const FIRST_PASS: u64 = 64;
 
 /// What is to be done.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +70,9 @@ pub struct Tally {
     pub seconds: f64,
     /// Of the samples that the job wants, those that a pixel has now, on average over the pixels.
     pub samples: f64,
-    /// [`Film::cautious_error`] when it was last looked at, and the samples a pixel then.
+    /// Whether every pixel has a sample of those that the job wants.
+    pub complete: bool,
+    /// Where it may end the run: [`Film::cautious_error`] when it was last looked at, and the samples a pixel then.
     pub error: Option<(u64, f64)>,
     /// Where the end is, by the stop condition that looks nearest; `None` while nothing is known.
     pub forecast: Option<Forecast>,
@@ -87,18 +87,19 @@ pub struct Forecast {
     pub left: f64,
 }
 
-/// The widest tile: every adapter's textures are wider (WebGPU promises 8192 texels).
-const MAX_TILE_WIDTH: u32 = 4096;
+/// The longest side of a tile: every adapter's textures are larger (WebGPU promises 8192 texels), by the texel too that
+/// the GPU's tiles may add to it.
+const MAX_TILE_SIDE: u32 = 4096;
 
 /// Cuts regions into tiles: disjoint rectangles that together hold the regions' pixels, bands of rows of
-/// columns at most 4096 pixels wide, at most `limit` pixels each (at least one row). Where the cuts lie
+/// columns, at most 4096 pixels a side and `limit` pixels in all (at least one row). Where the cuts lie
 /// touches no bit of the picture.
 pub fn tiles(regions: &[Rect], limit: u64) -> Vec<Rect> {
     let limit = limit.min(MAX_TILE_PIXELS);
     let mut out = Vec::new();
     for r in Rect::disjoint(regions).into_iter().flat_map(columns) {
         // Bands of equal height: a sliver as the last one would cost a call of its own.
-        let most = (limit / u64::from(r.width())).max(1);
+        let most = (limit / u64::from(r.width())).clamp(1, MAX_TILE_SIDE.into());
         let bands = u64::from(r.height()).div_ceil(most);
         let rows = u64::from(r.height()).div_ceil(bands) as u32;
         let mut y0 = r.y0;
@@ -111,11 +112,11 @@ pub fn tiles(regions: &[Rect], limit: u64) -> Vec<Rect> {
     out
 }
 
-/// A rectangle cut into columns of equal width, none wider than [`MAX_TILE_WIDTH`].
+/// A rectangle cut into columns of equal width, none wider than [`MAX_TILE_SIDE`].
 fn columns(r: Rect) -> impl Iterator<Item = Rect> {
     let width = r
         .width()
-        .div_ceil(r.width().div_ceil(MAX_TILE_WIDTH).max(1))
+        .div_ceil(r.width().div_ceil(MAX_TILE_SIDE).max(1))
         .max(1);
     (r.x0..r.x1).step_by(width as usize).map(move |x0| Rect {
         x0,
@@ -125,25 +126,14 @@ fn columns(r: Rect) -> impl Iterator<Item = Rect> {
 }
 
 /// The first sample count after `count` at which the error may end a run: whole numbers of rounds of all replicates,
-/// spaced by [`CHECK_FACTOR`], from [`MIN_CHECKED_SAMPLES`].
+/// spaced by [`CHECK_FACTOR`], from [`MIN_CHECKED_SAMPLES`]. Of counts that no pixel can have, the first.
 fn next_check(count: u64, round: u64) -> u64 {
-    spaced(count, round, MIN_CHECKED_SAMPLES, CHECK_FACTOR)
-}
-
-/// The first sample count after `count` at which a job looks at the error.
-fn next_look(count: u64, job: &Job) -> u64 {
-    match job.error {
-        Some(_) => next_check(count, job.round),
-        None => spaced(count, job.round, MIN_SHOWN_SAMPLES, SHOWN_CHECK_FACTOR),
-    }
-}
-
-/// The first count after `count` in a sequence of whole numbers of rounds of all replicates, spaced by `factor`.
-fn spaced(count: u64, round: u64, first: u64, factor: f64) -> u64 {
+    // A forecast may ask for any count: beyond this one the numbers below would overflow in the end.
+    let count = count.min(u32::MAX.into());
     let period = round * REPLICATES as u64;
-    let mut check = first.div_ceil(period) * period;
+    let mut check = MIN_CHECKED_SAMPLES.div_ceil(period) * period;
     while check <= count {
-        let next = (check as f64 * factor).ceil() as u64;
+        let next = (check as f64 * CHECK_FACTOR).ceil() as u64;
         check = next.div_ceil(period) * period;
     }
     check
@@ -183,6 +173,7 @@ impl<'a> Run<'a> {
                     - missing(&film.coverage, job) / pixels as f64
             }
         };
+        let complete = is_complete(&film.coverage, job);
         Self {
             job,
             engine,
@@ -190,6 +181,7 @@ impl<'a> Run<'a> {
             stop,
             tally: Tally {
                 samples,
+                complete,
                 ..Tally::default()
             },
             pace: None,
@@ -213,15 +205,14 @@ impl<'a> Run<'a> {
         'passes: loop {
             at = first_missing(&self.film.coverage, job, at);
             let count = at - job.samples.start;
-            let check = next_look(count.saturating_sub(1), job);
-            if count == check && self.enough(count) {
+            let is_check = count == next_check(count.saturating_sub(1), job.round);
+            if is_check && self.enough(count) {
                 return Ok(StopReason::Error);
             }
             if at >= job.samples.end {
                 return Ok(StopReason::Samples);
             }
-            let next = next_look(count, job);
-            let end = self.pass_end(at).min(job.samples.start + next);
+            let end = self.pass_end(at);
             let learning = self.pace.is_none();
             for tile in &job.tiles {
                 for (rect, ranges) in self.film.coverage.missing(*tile, at..end) {
@@ -253,6 +244,7 @@ impl<'a> Run<'a> {
         let done = self.call_on(None, rect, samples)?;
         if done {
             self.tally.samples += work / self.pixels as f64;
+            self.tally.complete = self.tally.complete || is_complete(&self.film.coverage, self.job);
         }
         Ok(done)
     }
@@ -279,10 +271,16 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Where a pass that starts at `at` ends: at the end of the block, of the job, or of what a call can do in time. The
-    /// first is one sample long.
+    /// Where a pass that starts at `at` ends: at the end of the block, of the job, or of what a call can do in time, and
+    /// where the error is looked at next. The first is one sample long.
     fn pass_end(&self, at: u64) -> u64 {
         let block_end = (at / BLOCK + 1) * BLOCK;
+        let count = at - self.job.samples.start;
+        let stop = match self.job.error {
+            Some(_) => next_check(count, self.job.round),
+            None if count < FIRST_PASS => FIRST_PASS,
+            None => self.job.samples.end,
+        };
         let mut length = 1;
         if let Some(pace) = self.pace {
             let fits = |seconds: f64, pixels: u64| (seconds / (pace * pixels as f64)) as u64;
@@ -295,6 +293,7 @@ impl<'a> Run<'a> {
         }
         (at + length.max(1))
             .min(block_end)
+            .min(self.job.samples.start + stop)
             .min(self.job.samples.end)
     }
 
@@ -311,13 +310,16 @@ impl<'a> Run<'a> {
         self.tally.seconds + self.pace.unwrap_or(0.0) * work / 2.0 > time.as_secs_f64()
     }
 
-    /// Looks at the error after `count` samples of every pixel; whether it is small enough.
+    /// Looks at the error after `count` samples of every pixel if it may end the run; whether it is small enough.
     fn enough(&mut self, count: u64) -> bool {
+        let Some(wanted) = self.job.error else {
+            return false;
+        };
         let Some(error) = self.film.cautious_error() else {
             return false;
         };
         self.tally.error = Some((count, error));
-        self.job.error.is_some_and(|wanted| error <= wanted)
+        error <= wanted
     }
 
     /// See [`Tally::forecast`].
@@ -335,7 +337,7 @@ impl<'a> Run<'a> {
             // The error falls with the square root of the samples, and is next looked at then or later.
             (Some(target), Some((count, error))) => {
                 let reached = count as f64 * (error / target).powi(2);
-                let check = next_look((reached as u64).max(count), job);
+                let check = next_check((reached as u64).max(count), job.round);
                 needed = needed.min(check as f64);
             }
             (Some(_), None) if job.time.is_none() => return None,
@@ -357,6 +359,18 @@ fn first_missing(coverage: &Coverage, job: &Job, from: u64) -> u64 {
         .filter_map(|(_, ranges)| ranges.first().map(|r| r.start))
         .min()
         .unwrap_or(job.samples.end)
+}
+
+/// See [`Tally::complete`].
+fn is_complete(coverage: &Coverage, job: &Job) -> bool {
+    let has = |r: &[Range<u64>]| r.iter().any(|r| r.end > job.samples.start);
+    let covered = coverage.cells().filter(|(_, ranges)| has(ranges));
+    let cells: Vec<Rect> = covered.map(|(rect, _)| rect).collect();
+    let area = |tile: &Rect| -> u64 {
+        let parts = cells.iter().filter_map(|c| c.intersection(tile));
+        parts.map(|r| r.area()).sum()
+    };
+    job.tiles.iter().all(|t| area(t) == t.area())
 }
 
 /// Samples times pixels that the film has of the job's tiles.

@@ -105,7 +105,19 @@ fn noise_is_the_same_and_a_patch_is_not() {
     run(&a, &c, &["--max-flip", "1"]).code(1);
     run(&a, &b, &["--max-relative-rmse", "0.1%"])
         .code(1)
-        .stdout(contains("different: relative RMSE is"));
+        .stdout(contains("different by the limits given (relative RMSE is "))
+        .stdout(contains(
+            "as a difference; without them the same up to their noise",
+        ));
+    run(&a, &c, &["--max-relative-rmse", "0.1%"])
+        .code(1)
+        .stdout(
+            contains("different in ").and(contains("; and by the limits given (relative RMSE is ")),
+        );
+    // Small rates are told in few digits.
+    run(&a, &b, &["--alpha", "1e-300"])
+        .code(0)
+        .stdout(contains("(false alarms: 1e-300)"));
     run(&a, &a, &[])
         .code(0)
         .stdout(contains("the same to the bit").and(contains("both were made with seed")));

@@ -143,13 +143,15 @@ fn every_truncation_is_detected() {
     let (path, _) = saved(dir.path(), &region_film());
     let good = fs::read(&path).unwrap();
     let mut random = Random(2);
-    let ends = (0..100).chain(good.len() - 50..good.len());
+    let ends = (1..100).chain(good.len() - 50..good.len());
     for end in ends.chain((0..50).map(|_| random.below(good.len() as u64) as usize)) {
         let text = refused(&path, &good[..end]);
         assert!(text.contains("truncated"), "{text}");
     }
     let text = refused(&path, &[&good[..], b"x"].concat());
     assert!(text.contains("after its end"), "{text}");
+    let text = refused(&path, b"");
+    assert!(text.contains("not a film: it is empty"), "{text}");
 }
 
 #[test]
@@ -157,9 +159,24 @@ fn other_kinds_of_files_are_named() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("film.npz");
     let zip = b"PK\x03\x04\x14\0\0\0\x08\0".repeat(50);
-    for bytes in [vec![0; 5000], b"title = \"x\"\n".repeat(100), zip] {
+    let png = b"\x89PNG\r\n\x1a\n".repeat(50);
+    for (bytes, what) in [
+        (vec![0; 5000], "it is no NumPy archive (.npz)"),
+        (
+            b"title = \"x\"\n".repeat(100),
+            "it is no NumPy archive (.npz)",
+        ),
+        (png, "it is a PNG picture"),
+        (
+            zip,
+            "it is an archive, but its first array is not \"provenance\"",
+        ),
+    ] {
         let text = refused(&path, &bytes);
-        assert!(text.contains("there is no \"provenance\""), "{text}");
+        assert!(
+            text.ends_with(&format!("film.npz: not a film: {what}")),
+            "{text}"
+        );
     }
     for missing in [dir.path().join("none.npz"), dir.path().into()] {
         let error = load(&missing).unwrap_err();
@@ -198,7 +215,7 @@ fn inconsistent_films_are_refused_saying_why() {
         (
             "\"size\":[7,5]",
             "\"size\":[5,5]",
-            "do not lie in the picture",
+            "its part 1,1,6,4 does not lie in the picture of 5x5 pixels",
         ),
         (
             "\"size\":[7,5]",
@@ -249,8 +266,10 @@ fn bad_numbers_are_refused_with_their_pixel() {
         ),
         (
             with(34, 3, -1.0),
-            "pixel (6, 4): \"sums\" holds -1, a negative",
+            "pixel (6, 4): \"sums\" holds -1.0, a negative",
         ),
+        // Not with three hundred digits.
+        (with(8, 3, -1e300), "holds -1e300, a negative sum"),
     ] {
         let (path, _) = saved(dir.path(), &film);
         let text = refused(&path, &fs::read(&path).unwrap());
@@ -287,7 +306,37 @@ fn bad_numbers_are_refused_with_their_pixel() {
     let mut bytes = fs::read(&path).unwrap();
     negate_first_count(&mut bytes, 300);
     let text = refused(&path, &bytes);
-    assert!(text.contains("pixel (0, 0) counts -1 samples"), "{text}");
+    let count = "pixel (0, 0) counts 18446744073709551615 samples where its coverage has 300";
+    assert!(text.contains(count), "{text}");
+}
+
+/// What NumPy saves again has other headers: that is said, not that something is missing.
+#[test]
+fn films_saved_by_another_program_are_named_so() {
+    if std::env::var("ETENDUE_SKIP_PYTHON").is_ok_and(|v| v == "1") {
+        eprintln!("ETENDUE_SKIP_PYTHON=1: not saved again by NumPy");
+        return;
+    }
+    let python = std::env::var("ETENDUE_PYTHON").unwrap_or("python3".into());
+    let dir = tempfile::tempdir().unwrap();
+    let (path, _) = saved(dir.path(), &whole_film());
+    for save in ["savez", "savez_compressed"] {
+        let again = dir.path().join(save).with_extension("npz");
+        let script = "import numpy, sys; getattr(numpy, sys.argv[3])(sys.argv[2], **numpy.load(sys.argv[1]))";
+        let done = std::process::Command::new(&python)
+            .args(["-c", script])
+            .args([&path, &again])
+            .arg(save)
+            .status();
+        assert!(done.expect("Python").success());
+        let text = load(&again).unwrap_err().to_string();
+        assert!(
+            text.contains(
+                "is not as etendue writes it: the film is damaged, or another program has saved it"
+            ),
+            "{text}"
+        );
+    }
 }
 
 #[test]
@@ -311,7 +360,9 @@ fn a_small_file_that_claims_to_be_huge_is_refused_at_once() {
     let mut bytes = fs::read(&path).unwrap();
     forge(&mut bytes, "\"x1\":6,\"y1\":4", "\"x1\":7,\"y1\":4");
     let text = refused(&path, &bytes);
-    assert!(text.contains("array \"counts\" has"), "{text}");
+    let counts =
+        "array \"counts\" has 120 bytes of numbers, and 3 x 6 numbers of type u64 take 144";
+    assert!(text.contains(counts), "{text}");
 }
 
 #[test]

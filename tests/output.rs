@@ -104,7 +104,7 @@ fn openexr_sees_the_same() {
             "software": "etendue 0.1.0",
             "scene": "Kästchen – \"one\"",
             "scene_hash": "0123456789abcdef".repeat(4),
-            "samples": provenance.samples as f64,
+            "samples": provenance.samples,
             "replicates": 4.0,
             "seed": 4294967295.0,
             "strata": 2.0,

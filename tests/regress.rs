@@ -129,7 +129,7 @@ fn goldens_are_made_and_pass_with_another_seed() {
     assert!(page.contains("2 scenes: 2 passed") && !page.contains("{{"));
     f.run(&["--filter", "wo"])
         .code(0)
-        .stdout(contains("1 scenes: 1 passed").and(contains("one").not()));
+        .stdout(contains("1 scene: 1 passed").and(contains("one").not()));
     // Enough samples for what was asked, and not many more.
     let power = |flag: &str| {
         f.run(&["--bless", "--filter", "one", "--power", flag])
@@ -211,6 +211,71 @@ fn bad_input_never_passes() {
         .args(["regress", "/nowhere"])
         .assert()
         .code(4);
+}
+
+#[test]
+fn broken_scenes_are_named_before_they_have_a_golden() {
+    let f = Folder::new(&["good"]);
+    f.put("bad", "nonsense");
+    std::fs::create_dir(f.path("folder.toml")).expect("made");
+    f.run(&[])
+        .code(2)
+        .stdout(contains("unusable  bad: ").and(contains("bad.toml:1:")))
+        .stdout(contains("folder.toml: cannot read: is a directory"))
+        .stdout(contains("new  good: no ").and(contains("3 scenes: 1 new, 2 unusable")));
+    // Each stands in one list alone, and a quiet run says nothing else.
+    let done = f.run(&["--quiet"]);
+    let done = done.get_output();
+    let out = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert_eq!(out.matches("good: ").count(), 1, "{out}");
+    assert!(done.stderr.is_empty());
+}
+
+#[test]
+fn goldens_have_no_more_samples_than_they_may_and_weak_ones_are_warned_of() {
+    let f = Folder::new(&["one"]);
+    f.run(&["--bless", "--max-spp", "8"])
+        .code(0)
+        .stdout(contains("8 samples a pixel"))
+        .stderr(contains("warning: one: ").and(contains(
+            "1.00 % was wanted: --max-spp allows no more samples",
+        )));
+    let picture = read_exr(&f.golden("one.exr")).expect("a golden");
+    assert_eq!(picture.samples.expect("counts")[0], 8);
+    f.run(&[]).code(0);
+    f.run(&["--bless", "--max-spp", "7"])
+        .code(2)
+        .stdout(contains(
+            "a golden of this scene takes 8 samples a pixel or more",
+        ));
+    // What is asked of goldens is no matter where none are made.
+    for flags in [["--max-spp", "8"], ["--power", "2%"], ["--size", "8x8"]] {
+        f.run(&flags).code(2).stderr(contains("--bless"));
+    }
+}
+
+#[test]
+fn no_adapter_is_no_verdict() {
+    let f = Folder::new(&["one"]);
+    f.bless();
+    let regress = |flags: &[&str]| {
+        Command::new(assert_cmd::cargo::cargo_bin!("etendue"))
+            .arg("regress")
+            .arg(f.0.path())
+            .args(flags)
+            // As if there were no driver.
+            .env("VK_DRIVER_FILES", "/nowhere")
+            .env("VK_ICD_FILENAMES", "/nowhere")
+            .assert()
+    };
+    regress(&["--backend", "gpu"])
+        .code(3)
+        .stdout("")
+        .stderr(contains("no Vulkan adapter"));
+    regress(&["--adapter", "x"]).code(3);
+    regress(&[])
+        .code(0)
+        .stderr(contains("rendering on the CPU reference"));
 }
 
 #[test]

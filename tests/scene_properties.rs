@@ -4,7 +4,7 @@ mod random_scene;
 
 use etendue::scene::check::lint;
 use etendue::scene::parse::{ReadError, parse_str, read};
-use etendue::scene::{Bsdf, Scene, Shape};
+use etendue::scene::{Bsdf, Place, Scene, Shape};
 use glam::DVec3;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -129,13 +129,16 @@ fn like(read: &Scene, written: &Scene) -> Scene {
     // Two roundings of coordinates up to 1.
     let same = |a: DVec3, b: DVec3| if (a - b).length() < 1e-15 { b } else { a };
     let mut read = read.clone();
+    for m in &mut read.materials {
+        m.place = Place::default();
+    }
     read.camera.up = same(read.camera.up, written.camera.up);
     for (a, b) in read.lights.iter_mut().zip(&written.lights) {
-        a.line = 0;
+        (a.line, a.column) = (0, 0);
         a.normal = same(a.normal, b.normal);
     }
     for (a, b) in read.primitives.iter_mut().zip(&written.primitives) {
-        a.line = 0;
+        (a.line, a.column) = (0, 0);
         if let (
             Shape::Plane { normal: n, .. } | Shape::Disk { normal: n, .. },
             Shape::Plane { normal: m, .. } | Shape::Disk { normal: m, .. },

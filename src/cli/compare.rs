@@ -2,18 +2,33 @@
 
 use super::args::CompareArgs;
 use super::failure::Failure;
+use super::files::Files;
+use super::progress::Progress;
 use super::{say, write_stdout};
 use crate::compare::{Limits, Picture, compare as compare_pictures, html};
 use crate::output::atomic;
 use std::io::Write;
+use std::path::Path;
+
+/// Two pictures to read, and to compare them.
+const STEPS: usize = 3;
 
 /// Prints what it finds; exit status 1 when the pictures differ.
 pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
+    let mut files = Files::default();
+    files.reads("a picture to compare", &args.a)?;
+    files.reads("a picture to compare", &args.b)?;
     if let Some(path) = &args.html {
-        atomic::check_writable(path)?;
+        files.writes("--html", path)?;
     }
-    let a = Picture::read(&args.a)?;
-    let b = Picture::read(&args.b)?;
+    super::set_threads(args.talk.threads);
+    let mut progress = Progress::new(&args.talk);
+    let mut read = |done: usize, path: &Path| {
+        progress.step(done, STEPS, &path.display().to_string());
+        Picture::read(path)
+    };
+    let (a, b) = (read(0, &args.a)?, read(1, &args.b)?);
+    progress.step(2, STEPS, "the comparison");
     let limits = Limits {
         alpha: args.alpha,
         max_flip: args.max_flip,
@@ -21,11 +36,14 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     };
     let comparison =
         compare_pictures(&a, &b, &limits).map_err(|e| Failure::Input(e.to_string()))?;
+    progress.finish();
     write_stdout(&comparison.report())?;
     if let Some(path) = &args.html {
         let page = html::page(&a, &b, &comparison);
         atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
-        say!("wrote {}", path.display());
+        if !args.talk.quiet {
+            say!("wrote {}", path.display());
+        }
     }
     if comparison.same() {
         Ok(())

@@ -2,9 +2,10 @@
 
 use super::args::DevelopArgs;
 use super::failure::Failure;
-use super::say;
+use super::files::Files;
+use super::progress::Progress;
 use crate::film::store;
-use crate::output::{Format, atomic};
+use crate::output::Format;
 
 /// Writes each picture as `render` would have.
 pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
@@ -13,15 +14,23 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
         .iter()
         .map(|path| Format::from_path(path).map_err(Failure::Input))
         .collect::<Result<_, _>>()?;
+    let mut files = Files::default();
+    files.reads("the film", &args.film)?;
     for path in &args.output {
-        atomic::check_writable(path)?;
+        files.writes("--output", path)?;
     }
+    super::set_threads(args.talk.threads);
+    let mut progress = Progress::new(&args.talk);
+    let steps = 1 + args.output.len();
+    progress.step(0, steps, &args.film.display().to_string());
     let (film, provenance) = store::load(&args.film)?;
-    for (format, path) in formats.iter().zip(&args.output) {
+    for (done, (format, path)) in formats.iter().zip(&args.output).enumerate() {
+        progress.step(1 + done, steps, &path.display().to_string());
         format.write(path, &film, &provenance, args.exposure)?;
-        if !args.quiet {
-            say!("wrote {}", path.display());
+        if !args.talk.quiet {
+            progress.say(&format!("wrote {}", path.display()));
         }
     }
+    progress.finish();
     Ok(())
 }

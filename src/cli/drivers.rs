@@ -20,6 +20,7 @@ pub(super) fn prepare(command: &Command) {
     let talk = match command {
         Command::Render(args) => Some(args.talk),
         Command::Selftest(args) => Some(args.talk),
+        Command::Regress(args) => Some(args.talk),
         Command::Bench(args) => {
             // What a kernel costs is told for one that is compiled afresh.
             set("MESA_SHADER_CACHE_DISABLE", || Some("true".into()));

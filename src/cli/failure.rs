@@ -12,7 +12,7 @@ pub enum Failure {
     /// A bad command line, or inputs that don't fit together.
     #[error("{0}")]
     Input(String),
-    /// A scene file's content is wrong; one message for each place.
+    /// A scene file's content is wrong, or files that it names can't be read; one message for each place.
     #[error("{} errors in the scene", .0.len())]
     Scene(Vec<Diagnostic>),
     /// No usable adapter, or the device failed.
@@ -24,7 +24,7 @@ pub enum Failure {
     /// A signal came, and what there was has been saved.
     #[error("interrupted")]
     Interrupted {
-        /// SIGINT is 2, SIGTERM 15.
+        /// SIGHUP is 1, SIGINT 2, SIGTERM 15.
         signal: u8,
     },
     /// Everything has been said already; only the exit status is left.
@@ -36,6 +36,7 @@ impl Failure {
     /// The exit status.
     pub fn status(&self) -> u8 {
         match self {
+            Failure::Scene(all) if all.iter().all(|d| d.unreadable) => 4,
             Failure::Input(_) | Failure::Scene(_) => 2,
             Failure::Device(_) => 3,
             Failure::File(e) if e.is_content() => 2,

@@ -17,6 +17,16 @@ pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
         SceneKind::Lights => ("lights.toml", generate::lights as fn(usize, u32, &str) -> _),
     };
     let scene = args.output.clone().unwrap_or(default.into());
+    // Rows beside it have the ending .csv: of another file than the scene.
+    if !scene
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    {
+        let scene = scene.display();
+        return Err(Failure::Input(format!(
+            "--output {scene}: a scene's name ends in .toml"
+        )));
+    }
     let rows = scene.with_extension("csv");
     let name = rows.file_name().unwrap_or_default().to_string_lossy();
     let made: generate::Generated = make(args.count as usize, args.seed, &name);

@@ -23,7 +23,7 @@ fn needed(pixels: u64) -> u64 {
 /// Refuses a picture part of `pixels` pixels that memory cannot hold, with the numbers.
 pub fn check(pixels: u64) -> Result<(), Failure> {
     match available() {
-        Some(have) if needed(pixels) > have => Err(Failure::Device(format!(
+        Some(have) if needed(pixels) > have => Err(Failure::Input(format!(
             "a film of {:.1} million pixels takes {:.1} GB and {:.1} GB are free: render a smaller --size, or \
                  a --region at a time",
             pixels as f64 / 1e6,

@@ -2,10 +2,12 @@
 
 use super::args::MergeArgs;
 use super::failure::Failure;
-use super::{memory, say};
+use super::files::Files;
+use super::progress::Progress;
+use super::{memory, plan, say};
 use crate::film::merge::{HoleKind, MergeError, holes, merge as add};
 use crate::film::store::{self, Outline};
-use crate::output::{FileError, atomic};
+use crate::output::FileError;
 use std::path::{Path, PathBuf};
 
 /// Holes that are listed; more would hide the rest.
@@ -22,11 +24,20 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
         }
         .into());
     }
-    atomic::check_writable(&args.out)?;
+    let mut files = Files::default();
+    for path in &args.films {
+        files.reads("a film to add", path)?;
+    }
+    files.writes_film("the sum", &args.out)?;
+    super::set_threads(args.talk.threads);
+    let mut progress = Progress::new(&args.talk);
     let films = fitting(&args.films)?;
     let (first, _) = films[0];
+    let steps = films.len() + 1;
+    progress.step(0, steps, &first.display().to_string());
     let (mut film, mut provenance) = store::load(first)?;
-    for (path, _) in &films[1..] {
+    for (done, (path, _)) in films.iter().enumerate().skip(1) {
+        progress.step(done, steps, &path.display().to_string());
         let (other, its) = store::load(path)?;
         // Checked before, but a file may have been replaced since.
         provenance
@@ -36,25 +47,25 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
         provenance.absorb(&its);
     }
     provenance.describe(&film);
+    progress.step(films.len(), steps, &args.out.display().to_string());
 
     let mut holes = holes(&film);
     if films.iter().any(|(_, its)| its.adaptive) {
         holes.retain(|hole| hole.kind != HoleKind::Short);
     }
     for hole in holes.iter().take(LISTED_HOLES) {
-        say!("warning: {hole}");
+        progress.say(&format!("warning: {hole}"));
     }
     if holes.len() > LISTED_HOLES {
-        say!("warning: {} more such holes", holes.len() - LISTED_HOLES);
+        let more = holes.len() - LISTED_HOLES;
+        progress.say(&format!("warning: {more} more such holes"));
     }
     store::save(&args.out, &film, &provenance)?;
-    if !args.quiet {
-        let (least, most) = film.coverage.samples();
-        say!(
-            "wrote {}: {} films, {least} to {most} samples a pixel",
-            args.out.display(),
-            args.films.len()
-        );
+    progress.finish();
+    if !args.talk.quiet {
+        let (out, n) = (args.out.display(), args.films.len());
+        let s = if n == 1 { "" } else { "s" };
+        say!("wrote {out}: {n} film{s}, {}", plan::samples_text(&film));
     }
     Ok(())
 }
@@ -83,8 +94,13 @@ fn fitting(paths: &[PathBuf]) -> Result<Vec<(&Path, Outline)>, Failure> {
     Ok(films)
 }
 
-/// Names both films: the fault is in the pair.
+/// Names both films: the fault is in the pair, unless one of them is damaged, which may be why.
 fn refused(first: &Path, path: &Path, why: &str) -> Failure {
+    for film in [first, path] {
+        if let Err(damage) = store::load(film) {
+            return damage.into();
+        }
+    }
     let message = format!("cannot be added to {}: {why}", first.display());
     FileError::content(path, message).into()
 }

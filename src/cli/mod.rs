@@ -9,6 +9,7 @@ mod compare;
 mod develop;
 mod drivers;
 mod failure;
+mod files;
 mod make_scene;
 mod memory;
 mod merge;

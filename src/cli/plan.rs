@@ -25,7 +25,7 @@ pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Fail
         if r.x1 > width || r.y1 > height {
             return Err(Failure::Input(format!(
                 "--region {}: it reaches out of the picture of {width}x{height} pixels",
-                rect_text(r)
+                r
             )));
         }
     }
@@ -46,8 +46,8 @@ pub fn check_bounds(path: &Path, film: &Film, bounds: Rect) -> Result<(), Failur
         "{}: this film holds the part {} of the picture, and the part asked for is {}; render the rest into a film \
          of its own, and merge",
         path.display(),
-        rect_text(&film.bounds),
-        rect_text(&bounds)
+        film.bounds,
+        bounds
     )))
 }
 
@@ -67,11 +67,6 @@ pub fn check_adaptive(
         _ => return Ok(()),
     };
     Err(FileError::content(path, problem).into())
-}
-
-/// A rectangle as `--region` reads it.
-fn rect_text(r: &Rect) -> String {
-    format!("{},{},{},{}", r.x0, r.y0, r.x1, r.y1)
 }
 
 /// The sample numbers that every pixel of `regions` is to have in the end.
@@ -153,6 +148,18 @@ fn end_for_pixel(wanted: u64, ranges: &[Range<u64>]) -> u64 {
 pub fn count(samples: u64) -> String {
     let s = if samples == 1 { "" } else { "s" };
     format!("{samples} sample{s} a pixel")
+}
+
+/// `120 samples a pixel`, or `119 to 120`.
+pub fn samples_text(film: &Film) -> String {
+    match film.coverage.samples() {
+        (a, b) if a == b => count(a),
+        (a, b) if film.pilot.is_some() => format!(
+            "{:.1} samples a pixel on average ({a} to {b})",
+            film.coverage.mean()
+        ),
+        (a, b) => format!("{a} to {}", count(b)),
+    }
 }
 
 /// What will end the run, for the start-up line.

@@ -1,6 +1,7 @@
 //! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere.
 
 use super::args::{ProgressStyle, Talk};
+use crate::film::Film;
 use crate::run::Tally;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use std::io::IsTerminal;
@@ -12,8 +13,17 @@ const STEPS: u64 = 1000;
 /// Between two lines.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
+/// Looking at the error may take this part of the time at most: large pictures are looked at less often.
+const LOOK_SHARE: u32 = 50;
+
 /// What shows progress.
-pub enum Progress {
+pub struct Progress {
+    shown: Shown,
+    looks: Looks,
+}
+
+/// How it is shown.
+enum Shown {
     /// Nothing does.
     Silent,
     /// A line every few seconds, the last one at this time.
@@ -25,47 +35,49 @@ pub enum Progress {
 impl Progress {
     /// What the flags ask for.
     pub fn new(talk: &Talk) -> Self {
-        match talk.progress {
-            _ if talk.quiet => Progress::Silent,
-            ProgressStyle::None => Progress::Silent,
+        let shown = match talk.progress {
+            _ if talk.quiet => Shown::Silent,
+            ProgressStyle::None => Shown::Silent,
             ProgressStyle::Auto if std::io::stderr().is_terminal() => {
                 let style =
                     BarStyle::with_template("{bar:32} {msg}").unwrap_or(BarStyle::default_bar());
                 let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());
-                Progress::Bar(bar.with_style(style))
+                Shown::Bar(bar.with_style(style))
             }
-            _ => Progress::Lines(Instant::now()),
-        }
+            _ => Shown::Lines(Instant::now()),
+        };
+        let looks = Looks::default();
+        Self { shown, looks }
     }
 
-    /// Shows where the run stands.
-    pub fn show(&mut self, tally: &Tally) {
-        match self {
-            Progress::Silent => {}
-            Progress::Lines(last) if last.elapsed() < LINE_EVERY => {}
-            Progress::Lines(last) => {
+    /// Shows where the run stands that has left `film`.
+    pub fn show(&mut self, film: &Film, tally: &Tally) {
+        match &mut self.shown {
+            Shown::Silent => {}
+            Shown::Lines(last) if last.elapsed() < LINE_EVERY => {}
+            Shown::Lines(last) => {
                 *last = Instant::now();
-                super::say!("{}", describe(tally));
+                super::say!("{}", describe(tally, self.looks.error(film, tally)));
             }
-            Progress::Bar(bar) => {
+            Shown::Bar(bar) => {
                 let fraction = tally.forecast.map_or(0.0, |f| f.fraction);
                 let done = (fraction * STEPS as f64) as u64;
                 bar.set_position(done.min(STEPS - 1));
-                bar.set_message(describe(tally));
+                bar.set_message(describe(tally, self.looks.error(film, tally)));
             }
         }
     }
 
     /// Shows how many of several things are done, and which is next.
     pub fn step(&mut self, done: usize, of: usize, next: &str) {
-        match self {
-            Progress::Silent => {}
-            Progress::Lines(last) if last.elapsed() < LINE_EVERY => {}
-            Progress::Lines(last) => {
+        match &mut self.shown {
+            Shown::Silent => {}
+            Shown::Lines(last) if last.elapsed() < LINE_EVERY => {}
+            Shown::Lines(last) => {
                 *last = Instant::now();
                 super::say!("{done} of {of} done, next {next}");
             }
-            Progress::Bar(bar) => {
+            Shown::Bar(bar) => {
                 bar.set_position(STEPS * done as u64 / of.max(1) as u64);
                 bar.set_message(next.to_owned());
             }
@@ -74,14 +86,14 @@ impl Progress {
 
     /// Shows the share of the work that is done, and what is being done.
     pub fn share(&mut self, fraction: f64, text: &str) {
-        match self {
-            Progress::Silent => {}
-            Progress::Lines(last) if last.elapsed() < LINE_EVERY => {}
-            Progress::Lines(last) => {
+        match &mut self.shown {
+            Shown::Silent => {}
+            Shown::Lines(last) if last.elapsed() < LINE_EVERY => {}
+            Shown::Lines(last) => {
                 *last = Instant::now();
                 super::say!("{text}, {:.0} %", (fraction * 100.0).floor().min(99.0));
             }
-            Progress::Bar(bar) => {
+            Shown::Bar(bar) => {
                 bar.set_position(((fraction * STEPS as f64) as u64).min(STEPS - 1));
                 bar.set_message(text.to_owned());
             }
@@ -90,8 +102,8 @@ impl Progress {
 
     /// Does something that writes to the terminal without tearing the bar.
     pub fn aside<T>(&self, f: impl FnOnce() -> T) -> T {
-        match self {
-            Progress::Bar(bar) => bar.suspend(f),
+        match &self.shown {
+            Shown::Bar(bar) => bar.suspend(f),
             _ => f(),
         }
     }
@@ -103,14 +115,67 @@ impl Progress {
 
     /// Clears the bar, so that the closing lines stand alone.
     pub fn finish(&mut self) {
-        if let Progress::Bar(bar) = self {
+        if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
         }
     }
 }
 
+/// A command that fails leaves no bar behind.
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+/// The picture's relative error as it was looked at last.
+#[derive(Default)]
+struct Looks {
+    last: Option<Look>,
+}
+
+struct Look {
+    /// Samples a pixel then.
+    samples: f64,
+    error: Option<f64>,
+    /// When it was done, and how long it took.
+    done: Instant,
+    took: Duration,
+}
+
+impl Looks {
+    /// The picture's relative error in words: as it is now if it is time to look, else what is to be expected since the
+    /// last look. Nothing while some pixels have no samples, for then it is that of a part.
+    fn error(&mut self, film: &Film, tally: &Tally) -> Option<String> {
+        if !tally.complete {
+            return None;
+        }
+        let due = |l: &Look| l.done.elapsed() >= l.took * LOOK_SHARE;
+        if self.last.as_ref().is_none_or(due) {
+            let begun = Instant::now();
+            let error = film.relative_error();
+            self.last = Some(Look {
+                samples: tally.samples,
+                error,
+                done: Instant::now(),
+                took: begun.elapsed(),
+            });
+        }
+        let look = self.last.as_ref()?;
+        let error = look.error?;
+        if tally.samples > look.samples {
+            // It falls with the square root of the samples.
+            return Some(format!(
+                "about {}",
+                percent(error * (look.samples / tally.samples).sqrt())
+            ));
+        }
+        Some(percent(error))
+    }
+}
+
 /// One line: samples, per cent, error so far, time left. Never says 100 %.
-fn describe(tally: &Tally) -> String {
+fn describe(tally: &Tally, error: Option<String>) -> String {
     let mut text = if tally.samples < 10.0 {
         format!("{:.1} samples", (tally.samples * 10.0).floor() / 10.0)
     } else {
@@ -120,8 +185,8 @@ fn describe(tally: &Tally) -> String {
         text += &format!(", {:.0} %", (f.fraction * 100.0).floor().min(99.0));
         text += &format!(", {} left", clock(f.left));
     }
-    if let Some((_, error)) = tally.error {
-        text += &format!(", relative error {}", percent(error));
+    if let Some(error) = error {
+        text += &format!(", relative error {error}");
     }
     text
 }
@@ -156,7 +221,6 @@ mod tests {
     fn a_line_never_says_all_is_done() {
         let tally = Tally {
             samples: 255.9,
-            error: Some((200, 0.0123)),
             forecast: Some(Forecast {
                 fraction: 1.0,
                 left: 0.04,
@@ -164,10 +228,10 @@ mod tests {
             ..Tally::default()
         };
         assert_eq!(
-            describe(&tally),
+            describe(&tally, Some("1.23 %".into())),
             "255 samples, 99 %, 0.0 s left, relative error 1.23 %"
         );
-        assert_eq!(describe(&Tally::default()), "0.0 samples");
+        assert_eq!(describe(&Tally::default(), None), "0.0 samples");
     }
 
     #[test]

@@ -2,13 +2,16 @@
 
 use super::args::RegressArgs;
 use super::failure::Failure;
+use super::files::{Files, is_stdout, write_text};
+use super::progress::Progress;
 use super::signals::Signals;
-use super::{backend, say, write_stdout};
+use super::{backend, memory, say, write_stdout};
 use crate::compare::Limits;
 use crate::engine::Engine;
 use crate::output::{FileError, atomic};
 use crate::regress::report::{self, Done};
-use crate::regress::{Case, Outcome, Wanted, bless, cases};
+use crate::regress::{Case, Outcome, Trouble, Wanted, bless, cases};
+use crate::scene::parse;
 use crate::settings::Settings;
 use crate::world::World;
 use std::io::Write;
@@ -19,10 +22,8 @@ use std::time::Instant;
 
 /// Runs every case and lists them; exit status 1 when one is not as it was, 2 when one can't be compared.
 pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
-    for path in [&args.html, &args.junit].into_iter().flatten() {
-        atomic::check_writable(path)?;
-    }
-    super::set_threads(args.threads);
+    backend::check_flags(args.backend, args.adapter.as_deref())?;
+    super::set_threads(args.talk.threads);
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
     let cases = cases(&args.dir, args.filter.as_deref().unwrap_or(""))?;
@@ -34,6 +35,13 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
         };
         return Err(FileError::content(&args.dir, format!("{what}: nothing to compare")).into());
     }
+    check_files(args, &cases)?;
+    // Without the adapter that was asked for no case says anything.
+    if let (_, Some(note)) = backend::open(args.backend, args.adapter.as_deref())?
+        && !args.talk.quiet
+    {
+        say!("{note}");
+    }
     let mut done = run(args, &cases, &signals);
     done.sort_by(|a, b| a.case.name.cmp(&b.case.name));
     if signals.stop.load(Ordering::Relaxed) {
@@ -43,23 +51,51 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     finish(args, &done)
 }
 
+/// Refuses results that would take the place of a scene, a golden, or each other.
+fn check_files(args: &RegressArgs, cases: &[Case]) -> Result<(), Failure> {
+    if args.html.is_none() && args.junit.is_none() {
+        return Ok(());
+    }
+    let mut files = Files::default();
+    for case in cases {
+        files.reads("a scene", &case.scene_path())?;
+        files.reads("a golden", &case.golden_path())?;
+        files.reads("what a failure leaves", &case.actual_path())?;
+        files.reads("what a failure leaves", &case.report_path())?;
+        // What is wrong with a scene is said in its turn.
+        for path in parse::read(&case.scene_path())
+            .iter()
+            .flat_map(|s| &s.row_files)
+        {
+            files.reads("a file of rows of a scene", path)?;
+        }
+    }
+    if let Some(path) = &args.html {
+        files.writes("--html", path)?;
+    }
+    if let Some(path) = &args.junit {
+        files.writes_text("--junit", path)?;
+    }
+    Ok(())
+}
+
 /// Every case, `--jobs` at a time; those that a signal cut off are left out.
 fn run(args: &RegressArgs, cases: &[Case], signals: &Signals) -> Vec<Done> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());
+    let progress = Mutex::new(Progress::new(&args.talk));
     std::thread::scope(|scope| {
         for _ in 0..usize::from(args.jobs).min(cases.len()) {
             scope.spawn(|| {
                 while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let finished = done.lock().unwrap_or_else(|p| p.into_inner()).len();
+                    let mut progress = progress.lock().unwrap_or_else(|p| p.into_inner());
+                    progress.step(finished, cases.len(), &case.name);
+                    drop(progress);
                     let Some(one) = run_one(args, case, signals) else {
                         return;
                     };
-                    if !args.quiet {
-                        say!("{:>8}  {}", one.outcome.word(), case.name);
-                    }
-                    done.lock()
-                        .unwrap_or_else(|poisoned| poisoned.into_inner())
-                        .push(one);
+                    done.lock().unwrap_or_else(|p| p.into_inner()).push(one);
                 }
             });
         }
@@ -70,11 +106,16 @@ fn run(args: &RegressArgs, cases: &[Case], signals: &Signals) -> Vec<Done> {
 
 fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
     let begun = Instant::now();
-    let engine = |world: &World, settings: &Settings| -> Result<(Box<dyn Engine>, u64), String> {
+    let engine = |world: &World, settings: &Settings| -> Result<(Box<dyn Engine>, u64), Trouble> {
+        let [width, height] = settings.size.map(u64::from);
         let adapter = args.adapter.as_deref();
-        let chosen =
-            backend::choose(args.backend, adapter, world, settings).map_err(|e| e.to_string())?;
-        Ok((chosen.engine, chosen.tile_pixels))
+        let chosen = memory::check(width * height)
+            .and_then(|()| backend::choose(args.backend, adapter, world, settings));
+        match chosen {
+            Ok(chosen) => Ok((chosen.engine, chosen.tile_pixels)),
+            Err(Failure::Device(why)) => Err(Trouble::Device(why)),
+            Err(other) => Err(Trouble::Input(other.to_string())),
+        }
     };
     let limits = Limits {
         alpha: args.alpha,
@@ -90,7 +131,7 @@ fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
         let outcome = match bless(case, &engine, &wanted, &signals.stop) {
             Ok(Some(blessed)) => Outcome::Blessed(blessed),
             Ok(None) => return None,
-            Err(why) => Outcome::Unusable(why),
+            Err(trouble) => trouble.into(),
         };
         (outcome, None)
     } else {
@@ -108,7 +149,7 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
     let mut list = String::new();
     for d in done {
         let detail = d.outcome.detail(&d.case);
-        list += &format!("{:>8}  {}: {detail}\n", d.outcome.word(), d.case.name);
+        list += &format!("{:>9}  {}: {detail}\n", d.outcome.word(), d.case.name);
         if let Outcome::Failed(comparison) = &d.outcome {
             for line in comparison.findings_text().lines() {
                 list += &format!("          {line}\n");
@@ -122,20 +163,30 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
         }
     }
     list += &format!("{}\n", report::summary(done));
-    write_stdout(&list)?;
+    if args.junit.as_deref().is_some_and(is_stdout) {
+        say!("{}", list.trim_end());
+    } else {
+        write_stdout(&list)?;
+    }
+    for d in done {
+        if let Outcome::Blessed(golden) = &d.outcome
+            && let Some(warning) = golden.warning(args.power)
+        {
+            say!("warning: {}: {warning}", d.case.name);
+        }
+    }
     if let Some(path) = &args.junit {
-        let xml = report::junit(done);
-        atomic::replace(path, |f| f.write_all(xml.as_bytes()))?;
+        write_text(path, &report::junit(done))?;
     }
     if let Some(path) = &args.html {
         let base = path.parent().unwrap_or(Path::new(""));
         let page = report::index(done, base);
         atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
     }
-    if done
-        .iter()
-        .any(|d| matches!(d.outcome, Outcome::Unusable(_)))
-    {
+    let any = |what: fn(&Outcome) -> bool| done.iter().any(|d| what(&d.outcome));
+    if any(|o| matches!(o, Outcome::NoDevice(_))) {
+        Err(Failure::Said(3))
+    } else if any(|o| matches!(o, Outcome::Unusable(_))) {
         Err(Failure::Said(2))
     } else if done.iter().any(|d| !d.outcome.good()) {
         Err(Failure::Said(1))

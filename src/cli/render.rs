@@ -3,6 +3,7 @@
 use super::args::RenderArgs;
 use super::backend::{self, Chosen};
 use super::failure::Failure;
+use super::files::{Files, write_text};
 use super::plan;
 use super::progress::{Progress, clock, percent};
 use super::saver::{Saver, longest_call};
@@ -15,13 +16,12 @@ use crate::film::pilot::Pilot;
 use crate::film::{Film, store};
 use crate::kernel;
 use crate::output::report::{self, Report, Seconds};
-use crate::output::{FileError, Format, atomic};
+use crate::output::{FileError, Format};
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::{Scene, check, parse};
 use crate::settings::Settings;
 use crate::world::World;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -31,7 +31,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
     // Whatever can be refused is refused now, before the first sample.
     let outputs = outputs(args);
-    check_outputs(args, &outputs)?;
+    let mut files = check_files(args, &outputs)?;
     backend::check_flags(args.backend, args.adapter.as_deref())?;
     super::set_threads(args.talk.threads);
     let signals =
@@ -40,6 +40,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     // The scene, and the film that may be there already.
     let text = parse::read_text(&args.scene)?;
     let scene = parse::parse_str(&args.scene, &text).map_err(Failure::Scene)?;
+    for path in &scene.row_files {
+        files.reads("a file of rows of the scene", path)?;
+    }
     let mut settings = Settings::resolve(&scene, &args.overrides());
     let _lock = args.film.as_deref().map(Lock::new).transpose()?;
     let old = load_film(args)?;
@@ -73,7 +76,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     if let Some(path) = &args.dump_wgsl {
         let wgsl = chosen.wgsl.take();
         let wgsl = wgsl.unwrap_or_else(|| kernel::compose(&world, &settings, None).wgsl);
-        atomic::replace(path, |f| f.write_all(wgsl.as_bytes()))?;
+        write_text(path, &wgsl)?;
     }
     let job = Job {
         tiles: run::tiles(&regions, chosen.tile_pixels),
@@ -98,7 +101,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let mut progress = Progress::new(&args.talk);
     let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &signals.stop);
     let ended = run.go(|film, tally| {
-        progress.show(tally);
+        progress.show(film, tally);
         saver.meanwhile(film, tally, &progress);
         Ok::<(), Failure>(())
     });
@@ -143,12 +146,12 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             },
             counters: tally.counters,
         };
-        write_report(path, &Report::new(facts, &film, &provenance))?;
+        write_text(path, &Report::new(facts, &film, &provenance).to_json())?;
     }
     if !args.talk.quiet {
         say_end(&film, &provenance, &tally, reason, &written);
     }
-    warn(&settings, &tally.counters, &film);
+    warn(&settings, &tally.counters, &film, &provenance);
     saved?;
     match reason {
         StopReason::Interrupted => Err(Failure::Interrupted {
@@ -173,8 +176,8 @@ fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
         .to_vec()
 }
 
-/// Refuses files that could not be written in the end.
-fn check_outputs(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), Failure> {
+/// Refuses files that could not be written in the end, and those that would take another's place.
+fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure> {
     for path in outputs {
         Format::from_path(path).map_err(Failure::Input)?;
     }
@@ -186,18 +189,28 @@ fn check_outputs(args: &RenderArgs, outputs: &[PathBuf]) -> Result<(), Failure> 
             "--watch {path}: the picture to follow is a .png"
         )));
     }
-    let named = [&args.watch, &args.dump_wgsl, &args.film]
-        .into_iter()
-        .flatten();
-    let report = args.report.iter().filter(|p| !is_stdout(p));
-    for path in outputs.iter().chain(named).chain(report) {
-        atomic::check_writable(path)?;
+    let mut files = Files::default();
+    files.reads("the scene", &args.scene)?;
+    let picture = match args.output[..] {
+        [] => "the picture (--output names another)",
+        _ => "--output",
+    };
+    for path in outputs {
+        files.writes(picture, path)?;
     }
-    Ok(())
-}
-
-fn is_stdout(path: &Path) -> bool {
-    path == Path::new("-")
+    if let Some(path) = &args.watch {
+        files.writes("--watch", path)?;
+    }
+    if let Some(path) = &args.film {
+        files.writes_film("--film", path)?;
+    }
+    if let Some(path) = &args.dump_wgsl {
+        files.writes_text("--dump-wgsl", path)?;
+    }
+    if let Some(path) = &args.report {
+        files.writes_text("--report", path)?;
+    }
+    Ok(files)
 }
 
 /// The film to go on with, if there is one.
@@ -250,7 +263,7 @@ fn say_start(
         plan::ends(args, settings)?
     );
     if let (Some(path), false) = (&args.film, film.coverage.is_empty()) {
-        let held = samples_text(film);
+        let held = plan::samples_text(film);
         text += &format!("; {} holds {held}", path.display());
     }
     say!("{text}");
@@ -275,18 +288,6 @@ fn say_other_adapters(args: &RenderArgs, held: &Provenance, device: &DeviceInfo)
     }
 }
 
-/// `120 samples a pixel`, or `119 to 120`.
-fn samples_text(film: &Film) -> String {
-    match film.coverage.samples() {
-        (a, b) if a == b => plan::count(a),
-        (a, b) if film.pilot.is_some() => format!(
-            "{:.1} samples a pixel on average ({a} to {b})",
-            film.coverage.mean()
-        ),
-        (a, b) => format!("{a} to {}", plan::count(b)),
-    }
-}
-
 /// The report's word for what ended the run.
 fn stop_reason(args: &RenderArgs, reason: StopReason) -> &'static str {
     match reason {
@@ -296,15 +297,6 @@ fn stop_reason(args: &RenderArgs, reason: StopReason) -> &'static str {
         StopReason::Error => "error",
         StopReason::Interrupted => "interrupted",
     }
-}
-
-fn write_report(path: &Path, report: &Report) -> Result<(), Failure> {
-    let text = report.to_json();
-    if is_stdout(path) {
-        return super::write_stdout(&text);
-    }
-    atomic::replace(path, |f| f.write_all(text.as_bytes()))?;
-    Ok(())
 }
 
 /// The closing lines.
@@ -323,7 +315,7 @@ fn say_end(
         say!("{text}nothing rendered, nothing written");
         return;
     }
-    text += &samples_text(film);
+    text += &plan::samples_text(film);
     text += &format!(" in {}", clock(tally.seconds));
     if tally.seconds > 0.0 {
         let speed = tally.counters.paths as f64 / tally.seconds / 1e6;
@@ -336,24 +328,30 @@ fn say_end(
     say!("wrote {}", written.join(", "));
 }
 
+/// Of paths that are cut, a smaller share than this makes no picture visibly darker: the report alone has their number.
+const CUT_SHARE: f64 = 1e-5;
+
 /// What the user must know about the picture.
-fn warn(settings: &Settings, counters: &Counters, film: &Film) {
-    if counters.truncated > 0 && settings.max_depth_is_default {
-        let share = counters.truncated as f64 / counters.paths as f64;
+fn warn(settings: &Settings, counters: &Counters, film: &Film, provenance: &Provenance) {
+    let share = counters.truncated as f64 / counters.paths.max(1) as f64;
+    if share > CUT_SHARE && settings.max_depth_is_default {
         say!(
-            "warning: {} of {} paths ({}) were cut after {} vertices, and the picture can be darker for it; \
-             --max-depth allows more",
+            "warning: {} of {} paths ({}) were cut after {} vertices, and the picture can be darker for it, by about that \
+             share; --max-depth N allows more",
             counters.truncated,
             counters.paths,
             percent(share),
             settings.max_depth
         );
     }
-    if let Some(tail) = film.heavy_tail().filter(|t| t.unsafe_mean) {
+    if let Some(error) = provenance.relative_error
+        && film.heavy_tail().is_some_and(|tail| tail.unsafe_mean)
+    {
         say!(
-            "warning: rare bright samples make this picture's stated error unsafe (0.1 % of its parts carry {} of the mean \
-             square): the error may be larger; more samples will tell",
-            percent(tail.top_share)
+            "warning: the true error may be above the stated {}, often by a fifth or more: much of it lies in rare bright samples \
+             (light that glass or mirrors focus, for one), of which few have been met yet; more samples will tell (--spp, \
+             --time)",
+            percent(error)
         );
     }
     if let Some((x, y, sample)) = counters.first_nonfinite {

@@ -1,10 +1,10 @@
-//! Ctrl-C and SIGTERM as a flag that the render loop reads; a second signal ends the process at once. And the
+//! Ctrl-C, SIGTERM and SIGHUP as a flag that the render loop reads; a second signal ends the process at once. And the
 //! signal that must not end it.
 
-use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
-use std::io;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::{fs, io};
 
 /// A write beyond the limit on file sizes (`ulimit -f`) then fails like one to a full disk, with a message, instead of
 /// ending the process.
@@ -13,7 +13,7 @@ pub fn outlive_size_limits() {
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
 }
 
-/// The two signals' handlers, installed for the rest of the process.
+/// The signals' handlers, installed for the rest of the process.
 pub struct Signals {
     /// Set by the first signal.
     pub stop: Arc<AtomicBool>,
@@ -26,7 +26,9 @@ impl Signals {
     pub fn install() -> io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let number = Arc::new(AtomicUsize::new(0));
-        for signal in [SIGINT, SIGTERM] {
+        // What a terminal that goes away sends; `nohup` has it ignored, and so it stays then.
+        let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        for signal in [SIGINT, SIGTERM].into_iter().chain(hang_up) {
             // Handlers run in this order: the first signal finds `stop` unset and sets it.
             signal_hook::flag::register_conditional_shutdown(
                 signal,
@@ -43,4 +45,15 @@ impl Signals {
     pub fn number(&self) -> u8 {
         self.number.load(Ordering::Relaxed) as u8
     }
+}
+
+/// Whether the process was started with this signal ignored. Where the system does not tell (Linux does), so that a handler
+/// could undo it: as if it were.
+fn is_ignored(signal: i32) -> bool {
+    let mask = || {
+        let status = fs::read_to_string("/proc/self/status").ok()?;
+        let line = status.lines().find_map(|l| l.strip_prefix("SigIgn:"))?;
+        u64::from_str_radix(line.trim(), 16).ok()
+    };
+    mask().is_none_or(|ignored| ignored >> (signal - 1) & 1 == 1)
 }

@@ -1,4 +1,5 @@
-//! Values of flags: each parser's error quotes nothing but the rule, since clap names flag and value.
+//! Values of flags: each parser's error quotes nothing but the rule, since clap names flag and value. Flags whose values
+//! these read take what begins with a hyphen, so that -1 is told the rule and not taken for another flag.
 
 use crate::film::coverage::Rect;
 use crate::settings::LightParts;
@@ -62,6 +63,52 @@ pub fn relative_error(text: &str) -> Result<f64, String> {
         Ok(value)
     } else {
         Err("a relative error is more than 0 and at most 1 (100%)".into())
+    }
+}
+
+/// A relative change: `0.01` or `1%`; more than 0, at most 1.
+pub fn change(text: &str) -> Result<f64, String> {
+    const RULE: &str = "expected a change such as 0.01 or 1%, more than 0 and at most 1 (100%)";
+    let change = limit(text).map_err(|_| RULE)?;
+    if change > 0.0 && change <= 1.0 {
+        Ok(change)
+    } else {
+        Err(RULE.into())
+    }
+}
+
+/// A share, 0 to 1: `0.02` or `2%`.
+pub fn share(text: &str) -> Result<f64, String> {
+    match limit(text) {
+        Ok(x) if x <= 1.0 => Ok(x),
+        _ => Err("expected a number from 0 to 1, such as 0.02 or 2%".into()),
+    }
+}
+
+/// A whole number from `low` to `high`.
+pub fn whole<T: TryFrom<u64>>(
+    low: u64,
+    high: u64,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync {
+    move |text| {
+        let number = text.parse::<u64>().ok();
+        number
+            .filter(|n| (low..=high).contains(n))
+            .and_then(|n| T::try_from(n).ok())
+            .ok_or_else(|| format!("expected a whole number from {low} to {high}"))
+    }
+}
+
+/// A seed, any u32.
+pub fn seed() -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync {
+    whole(0, u32::MAX.into())
+}
+
+/// Part of an adapter's name: nothing is part of every name.
+pub fn part_of_name(text: &str) -> Result<String, String> {
+    match text.trim() {
+        "" => Err("expected a part of an adapter's name; etendue adapters lists them".into()),
+        name => Ok(name.into()),
     }
 }
 

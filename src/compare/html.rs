@@ -269,7 +269,8 @@ fn sensitivity(comparison: &Comparison) -> String {
     let mut s = format!(
         "<h2>What would have been seen</h2><p class=\"soft\">Of {} tests with {} false alarms allowed in all, the \
          relative change of light that they find with 95 % probability; for blocks, in half of them.</p><table>",
-        v.tests, v.alpha
+        v.tests,
+        text::brief(v.alpha)
     );
     for x in &v.sensitivity {
         let what = match x.side {

@@ -4,7 +4,7 @@ use crate::film::{Film, store};
 use crate::output::error::open;
 use crate::output::{FileError, Pixels, entries, read_exr};
 use crate::provenance::Provenance;
-use std::io::BufReader;
+use std::io::{BufReader, Read as _};
 use std::path::Path;
 
 /// A picture with what is known of its noise.
@@ -36,10 +36,22 @@ pub struct Noise {
 }
 
 impl Picture {
-    /// Reads a picture by its extension: `.exr`, `.npz` (a film) or `.png`, which has no error layers.
+    /// Reads a picture by its extension: `.exr`, `.npz` (a film) or `.png`, which has no error layers. Under another name it may
+    /// be a film or an EXR file still, by its first bytes.
     pub fn read(path: &Path) -> Result<Self, FileError> {
+        let mut file = open(path)?;
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        match extension.as_deref() {
+        let kind = extension.filter(|e| matches!(e.as_str(), "exr" | "npz" | "png"));
+        let kind = kind.or_else(|| {
+            let mut start = [0; 4];
+            file.read_exact(&mut start).ok()?;
+            match &start {
+                b"PK\x03\x04" => Some("npz".into()),
+                b"\x76\x2f\x31\x01" => Some("exr".into()),
+                _ => None,
+            }
+        });
+        match kind.as_deref() {
             Some("exr") => Self::from_exr(path),
             Some("npz") => {
                 let (film, provenance) = store::load(path)?;

@@ -7,23 +7,22 @@ use std::fmt::Write as _;
 pub(super) const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 impl Comparison {
-    /// The verdict in one sentence.
+    /// The verdict in one sentence, and what the limits say besides.
     pub fn sentence(&self) -> String {
-        let mut text = match &self.verdict {
+        let exceeded = self.exceeded.join("; ");
+        match &self.verdict {
             Some(v) if self.identical && v.same() => "the same to the bit".into(),
-            Some(v) => verdict_sentence(v),
-            None if self.same() => {
+            Some(v) if exceeded.is_empty() => verdict_sentence(v),
+            Some(v) if v.same() => format!(
+                "different by the limits given ({exceeded}), which count noise as a difference; without them {}",
+                verdict_sentence(v)
+            ),
+            Some(v) => format!("{}; and by the limits given ({exceeded})", verdict_sentence(v)),
+            None if exceeded.is_empty() => {
                 "within the limits (the pictures do not state their noise, so this is no statistical verdict)".into()
             }
-            None => String::new(),
-        };
-        for what in &self.exceeded {
-            if !text.is_empty() {
-                text += "; ";
-            }
-            let _ = write!(text, "different: {what}");
+            None => format!("different: {exceeded}"),
         }
-        text
     }
 
     /// A table of where the difference is; empty when there is none.
@@ -66,7 +65,7 @@ impl Comparison {
 }
 
 fn verdict_sentence(v: &Verdict) -> String {
-    let alpha = v.alpha;
+    let alpha = brief(v.alpha);
     if v.same() {
         let mut text = format!("the same up to their noise (false alarms: {alpha})");
         let told: Vec<String> = v.sensitivity.iter().filter_map(seen).take(3).collect();
@@ -86,6 +85,15 @@ fn verdict_sentence(v: &Verdict) -> String {
         };
         let first = v.findings.first().map(place).unwrap_or_default();
         format!("different {first}: equal pictures look so with probability {p} (limit {alpha})")
+    }
+}
+
+/// A probability, without hundreds of digits.
+pub(super) fn brief(p: f64) -> String {
+    if p < 1e-4 {
+        format!("{p:e}")
+    } else {
+        p.to_string()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Which pixels have had which samples: disjoint rectangles, each with its ranges of sample numbers.
 
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::ops::Range;
 
 /// Half-open pixel rectangle: x0 <= x < x1, y0 <= y < y1.
@@ -105,6 +106,14 @@ impl Rect {
             out.extend(rest.into_iter().filter(|p| p.area() > 0));
         }
         out
+    }
+}
+
+/// `x0,y0,x1,y1`, as `--region` reads it.
+impl fmt::Display for Rect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { x0, y0, x1, y1 } = self;
+        write!(f, "{x0},{y0},{x1},{y1}")
     }
 }
 

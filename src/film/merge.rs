@@ -25,7 +25,7 @@ pub enum MergeError {
         other: u32,
     },
     /// Samples would count twice.
-    #[error("samples {}..{} of pixels {} are in both films", samples.start, samples.end, show(rect))]
+    #[error("samples {}..{} of pixels {} are in both films", samples.start, samples.end, rect)]
     Overlap {
         /// Pixels that both have.
         rect: Rect,
@@ -42,12 +42,6 @@ impl MergeError {
             None => Ok(()),
         }
     }
-}
-
-/// `x0,y0,x1,y1`, as `--region` reads it.
-fn show(rect: &Rect) -> String {
-    let Rect { x0, y0, x1, y1 } = rect;
-    format!("{x0},{y0},{x1},{y1}")
 }
 
 /// Adds `other` to `into`, whose bounds grow to hold both. On an error `into` is as it was.
@@ -175,7 +169,7 @@ pub enum HoleKind {
 
 impl fmt::Display for Hole {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rect = show(&self.rect);
+        let rect = self.rect;
         match self.kind {
             HoleKind::Uncovered => write!(f, "pixels {rect} have no samples"),
             HoleKind::Gap | HoleKind::Short => write!(

@@ -20,6 +20,9 @@ const PERMISSIONS: u32 = 0o100_644 << 16;
 const DATE: u16 = 1 << 5 | 1;
 /// "See the ZIP64 record".
 const SEE_64: u32 = u32::MAX;
+/// Said of what differs in archives that NumPy or an archiver has written anew, too.
+const NOT_OURS: &str =
+    "is not as etendue writes it: the film is damaged, or another program has saved it";
 /// Bytes of a local header before the name.
 const LOCAL_FIXED: usize = 30;
 
@@ -42,6 +45,8 @@ pub enum Damage {
     Io(io::Error),
     /// It is not what it should be.
     Wrong(String),
+    /// It is something else altogether.
+    Alien(String),
 }
 
 impl From<io::Error> for Damage {
@@ -131,16 +136,24 @@ impl<R: Read> Reader<R> {
         let (crc32, size) = self.local(name)?;
         let expected = npy_header(descr, shape);
         let bytes = items.saturating_mul(size_of::<T>() as u64);
-        if size != bytes.saturating_add(expected.len() as u64) {
+        let header = expected.len() as u64;
+        let numbers = || {
+            let shape: Vec<String> = shape.iter().map(u64::to_string).collect();
+            format!("{} numbers of type {}", shape.join(" x "), type_name(descr))
+        };
+        if size != bytes.saturating_add(header) {
             return Err(Damage::Wrong(format!(
-                "array \"{name}\" has {size} bytes, not those of type {descr} and shape {shape:?}"
+                "array \"{name}\" has {} bytes of numbers, and {} take {bytes}",
+                size.saturating_sub(header),
+                numbers()
             )));
         }
         let mut npy = vec![0; expected.len()];
         self.from.read_exact(&mut npy)?;
         if npy != expected {
             return Err(Damage::Wrong(format!(
-                "array \"{name}\" is not of type {descr} and shape {shape:?}"
+                "array \"{name}\" does not hold {}",
+                numbers()
             )));
         }
         let mut data = self.allocate::<T>(items)?;
@@ -154,10 +167,14 @@ impl<R: Read> Reader<R> {
     /// The end of the archive: nothing but the directory of what was read.
     pub fn finish(mut self) -> Result<(), Damage> {
         let expected = directory(&self.members, self.at);
-        let mut found = vec![0; expected.len()];
-        self.from.read_exact(&mut found)?;
+        let mut found = Vec::new();
+        let most = expected.len() as u64;
+        self.from.by_ref().take(most).read_to_end(&mut found)?;
+        if found.len() < expected.len() && expected.starts_with(&found) {
+            return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
+        }
         if found != expected {
-            return Err(Damage::Wrong("its directory is wrong".into()));
+            return Err(Damage::Wrong(format!("its directory {NOT_OURS}")));
         }
         if self.from.read(&mut [0])? != 0 {
             return Err(Damage::Wrong("it has bytes after its end".into()));
@@ -168,22 +185,45 @@ impl<R: Read> Reader<R> {
     /// Reads a local header; returns CRC and size of what follows.
     fn local(&mut self, name: &'static str) -> Result<(u32, u64), Damage> {
         let mut found = vec![0; local_header(name, 0, 0).len()];
-        self.from.read_exact(&mut found)?;
+        if self.members.is_empty() {
+            self.check_start(&mut found[..4])?;
+            self.from.read_exact(&mut found[4..])?;
+        } else {
+            self.from.read_exact(&mut found)?;
+        }
         let crc32 = u32::from_le_bytes(found[14..18].try_into().expect("four bytes"));
         let end = found.len();
         let size = u64::from_le_bytes(found[end - 8..].try_into().expect("eight bytes"));
         if found != local_header(name, crc32, size) {
             let stored = &found[LOCAL_FIXED..LOCAL_FIXED + name.len()];
-            return Err(Damage::Wrong(if stored == name.as_bytes() {
-                format!("the header of \"{name}\" is wrong")
-            } else {
-                format!("there is no \"{name}\" where it should be")
-            }));
+            let first = self.members.is_empty();
+            return Err(match stored == name.as_bytes() {
+                true => Damage::Wrong(format!("the header of its array \"{name}\" {NOT_OURS}")),
+                false if first => Damage::Alien(format!(
+                    "it is an archive, but its first array is not \"{name}\""
+                )),
+                false => Damage::Wrong(format!("its array \"{name}\" is not where it should be")),
+            });
         }
         if size > self.length {
             return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into());
         }
         Ok((crc32, size))
+    }
+
+    /// Reads the first bytes of the file into `start`: those of an archive, or it is none.
+    fn check_start(&mut self, start: &mut [u8]) -> Result<(), Damage> {
+        if self.length == 0 {
+            return Err(Damage::Alien("it is empty".into()));
+        }
+        self.from.read_exact(start)?;
+        let what = match &*start {
+            b"PK\x03\x04" => return Ok(()),
+            b"\x89PNG" => "it is a PNG picture",
+            b"\x76\x2f\x31\x01" => "it is an EXR picture",
+            _ => "it is no NumPy archive (.npz)",
+        };
+        Err(Damage::Alien(what.into()))
     }
 
     fn passed(&mut self, name: &'static str, crc32: u32, size: u64) {
@@ -208,6 +248,16 @@ impl<R: Read> Reader<R> {
             .map_err(|_| Damage::Io(io::ErrorKind::OutOfMemory.into()))?;
         data.resize(items, T::zeroed());
         Ok(data)
+    }
+}
+
+/// What Rust calls a type of NumPy's.
+fn type_name(descr: &str) -> &str {
+    match descr {
+        "<u8" => "u64",
+        "<f8" => "f64",
+        "<f4" => "f32",
+        other => other,
     }
 }
 

@@ -180,6 +180,7 @@ fn reading<T>(
         },
         Damage::Io(e) => FileError::reading(path, &e),
         Damage::Wrong(what) => FileError::content(path, format!("no usable film: {what}")),
+        Damage::Alien(what) => FileError::content(path, format!("not a film: {what}")),
     })
 }
 
@@ -229,7 +230,7 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
         return Err(Damage::Wrong(format!(
             "pixel {} counts {} samples where its coverage has {}",
             pixel(header.bounds, i),
-            stored[i] as i64,
+            stored[i],
             counts[i]
         )));
     }
@@ -270,11 +271,11 @@ fn pixel(bounds: Rect, i: usize) -> String {
 fn check_pixel(array: &str, sums: &[Sums<f64>; REPLICATES], count: u64) -> Result<(), String> {
     let mut all = sums.iter().flatten();
     if let Some(x) = all.clone().find(|x| !x.is_finite()) {
-        return Err(format!("\"{array}\" holds {x}, which is not a number"));
+        return Err(format!("\"{array}\" holds {x}, which is not finite"));
     }
     if let Some(s) = sums.iter().find(|s| s[3] < 0.0) {
         return Err(format!(
-            "\"{array}\" holds {}, a negative sum of squares",
+            "\"{array}\" holds {:?}, a negative sum of squares",
             s[3]
         ));
     }
@@ -303,7 +304,10 @@ fn check_header(header: &Header) -> Result<(), String> {
         return Err(format!("size {w}x{h}: a side has 1 to {MAX_SIDE} pixels"));
     }
     if bounds.area() == 0 || bounds.intersection(&Rect::whole(size)) != Some(bounds) {
-        return Err(format!("bounds {bounds:?} do not lie in the picture"));
+        return Err(format!(
+            "its part {bounds} does not lie in the picture of {}x{} pixels",
+            size[0], size[1]
+        ));
     }
     if (replicates, block) != (REPLICATES, BLOCK) {
         return Err(format!(
@@ -320,12 +324,16 @@ fn check_header(header: &Header) -> Result<(), String> {
     }
     for (rect, ranges) in coverage.cells() {
         if rect.area() == 0 || rect.intersection(&bounds) != Some(rect) {
-            return Err(format!("coverage {rect:?} does not lie in the film"));
+            return Err(format!(
+                "its coverage {rect} does not lie in the film's part {bounds} of the picture"
+            ));
         }
         let ordered = ranges.windows(2).all(|r| r[0].end < r[1].start);
         let empty = ranges.iter().any(|r: &Range<u64>| r.start >= r.end);
         if ranges.is_empty() || empty || !ordered {
-            return Err(format!("coverage has the sample ranges {ranges:?}"));
+            return Err(format!(
+                "its coverage of {rect} has the sample ranges {ranges:?}, which are not ascending and apart"
+            ));
         }
     }
     Ok(())
@@ -343,7 +351,7 @@ fn counts(coverage: &Coverage, bounds: Rect) -> Result<Vec<u64>, String> {
                 row + (rect.x0 - bounds.x0) as usize..row + (rect.x1 - bounds.x0) as usize;
             for count in &mut counts[columns] {
                 if *count != 0 {
-                    return Err(format!("coverage {rect:?} overlaps another"));
+                    return Err(format!("its coverage {rect} overlaps another"));
                 }
                 *count = samples;
             }

@@ -28,7 +28,7 @@ pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
         ("software", text(&format!("{} {}", p.software, p.version))),
         ("scene", p.scene_title.as_deref().and_then(text)),
         ("scene_hash", text(&p.scene_hash)),
-        ("samples", number(p.samples as f64)),
+        ("samples", number(p.samples)),
         ("replicates", number(p.replicates.into())),
         ("seed", number(s.seed.into())),
         ("strata", number(s.strata.into())),

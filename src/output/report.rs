@@ -5,7 +5,7 @@ use super::error::FileError;
 use crate::engine::{Counters, DeviceInfo};
 use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::provenance::Provenance;
+use crate::provenance::{Provenance, count_or_mean};
 use crate::stats::tail::Tail;
 use serde::Serialize;
 use std::io::{self, Write};
@@ -28,8 +28,9 @@ pub struct Report {
     pub regions: Vec<[u32; 4]>,
     /// Seed.
     pub seed: u32,
-    /// Samples of the pixel that has the most, those of earlier runs included; of an adaptive picture the mean.
-    pub spp: u64,
+    /// Samples of a pixel that has any, on average, those of earlier runs included.
+    #[serde(serialize_with = "count_or_mean")]
+    pub spp: f64,
     /// Which condition ended the run.
     pub stop_reason: String,
     /// Where the time went.
@@ -114,10 +115,7 @@ impl Report {
                 .map(|r| [r.x0, r.y0, r.x1, r.y1])
                 .collect(),
             seed: provenance.settings.seed,
-            spp: match film.pilot {
-                Some(_) => film.coverage.mean().round() as u64,
-                None => film.coverage.samples().1,
-            },
+            spp: film.coverage.mean(),
             stop_reason: run.stop_reason,
             seconds: run.seconds,
             paths: run.counters.paths,

@@ -1,6 +1,6 @@
 //! Golden pictures: made with just enough samples, and read back with the settings that made them.
 
-use super::{Case, MakeEngine, render, text};
+use super::{Case, MakeEngine, Trouble, render, text};
 use crate::compare::{Picture, verdict::verdict};
 use crate::film::Film;
 use crate::film::REPLICATES;
@@ -52,14 +52,32 @@ impl fmt::Display for Bless {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [w, h] = self.size;
         let (samples, bytes, power) = (self.samples, self.bytes, 100.0 * self.power);
-        write!(
-            f,
-            "{w}x{h}, {samples} samples a pixel, {bytes} bytes; sees a change of all light by {power:.2} %"
-        )?;
-        if self.short {
-            f.write_str(" (less was wanted, but --max-spp allows no more samples)")?;
+        let s = if samples == 1 { "" } else { "s" };
+        write!(f, "{w}x{h}, {samples} sample{s} a pixel, {bytes} bytes; ")?;
+        if self.power >= 1.0 {
+            return f.write_str("too noisy to see any change of all light");
         }
-        Ok(())
+        write!(f, "sees a change of all light by {power:.2} %")
+    }
+}
+
+impl Bless {
+    /// What to say of a golden that sees less than was `wanted`.
+    pub fn warning(&self, wanted: f64) -> Option<String> {
+        let sees = if self.power >= 1.0 {
+            "not see even that all light has doubled".to_owned()
+        } else {
+            format!(
+                "see a change of all light by {:.2} % or more",
+                100.0 * self.power
+            )
+        };
+        self.short.then(|| {
+            format!(
+                "comparisons with this golden will {sees}, and {:.2} % was wanted: --max-spp allows no more samples",
+                100.0 * wanted
+            )
+        })
     }
 }
 
@@ -69,7 +87,7 @@ pub fn bless(
     engine: &MakeEngine,
     wanted: &Wanted,
     stop: &AtomicBool,
-) -> Result<Option<Bless>, String> {
+) -> Result<Option<Bless>, Trouble> {
     let path = case.scene_path();
     let source = parse::read_text(&path).map_err(text)?;
     let scene =
@@ -88,10 +106,10 @@ pub fn bless(
     };
     let settings = Settings::resolve(&scene, &overrides);
     let mut provenance = Provenance::new(&scene, source, &settings);
+    let (step, most) = steps(settings.round(), wanted.most_samples)?;
     let (mut engine, tile) = engine(&World::new(&scene, size), &settings)?;
     let mut film = Film::new(size, Rect::whole(size), settings.strata);
-    let period = settings.round() * REPLICATES as u64;
-    let whole_rounds = |n: f64| (n as u64).min(wanted.most_samples).div_ceil(period) * period;
+    let whole_rounds = |n: f64| ((n as u64).div_ceil(step) * step).min(most);
     let mut samples = whole_rounds(FIRST_LOOK as f64);
     let power = loop {
         if !render(
@@ -108,7 +126,7 @@ pub fn bless(
         // Held against itself, it says what a comparison with its like would have seen.
         let seen = verdict(&picture, &picture, wanted.alpha).sensitivity;
         let power = seen.first().map_or(f64::INFINITY, |s| s.change);
-        if power <= wanted.power || samples >= wanted.most_samples {
+        if power <= wanted.power || samples >= most {
             break power;
         }
         // Noise falls with the square root of the samples; a first look may be far off.
@@ -128,6 +146,21 @@ pub fn bless(
         short: power > wanted.power,
         bytes: bytes.len(),
     }))
+}
+
+/// The unit of a golden's samples, and the most of them that there may be: whole rounds of all replicates, or of some where
+/// `most` samples are fewer. Their error takes two.
+fn steps(round: u64, most: u64) -> Result<(u64, u64), String> {
+    let period = round * REPLICATES as u64;
+    let step = if most >= period { period } else { round };
+    let most = most / step * step;
+    if most < 2 * round {
+        return Err(format!(
+            "--max-spp is too low: a golden of this scene takes {} samples a pixel or more, for its error must be known",
+            2 * round
+        ));
+    }
+    Ok((step, most))
 }
 
 /// What a golden's header says that it takes to make its like.
@@ -204,4 +237,18 @@ impl Facts {
 
 fn number<T: FromStr>(golden: &Picture, key: &str) -> Option<T> {
     golden.origin(key)?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_golden_has_more_samples_than_it_may_have() {
+        assert_eq!(steps(4, 4096), Ok((16, 4096)));
+        assert_eq!(steps(4, 100), Ok((16, 96)));
+        assert_eq!(steps(4, 15), Ok((4, 12)));
+        assert_eq!(steps(4, 8), Ok((4, 8)));
+        assert!(steps(4, 7).is_err_and(|e| e.contains("takes 8 samples a pixel or more")));
+    }
 }

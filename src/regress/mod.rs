@@ -25,9 +25,33 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Makes an engine for a scene.
+/// Makes an engine for a scene, and says how many pixels to give it at once.
 pub type MakeEngine<'a> =
-    dyn Fn(&World, &Settings) -> Result<(Box<dyn Engine>, u64), String> + Sync + 'a;
+    dyn Fn(&World, &Settings) -> Result<(Box<dyn Engine>, u64), Trouble> + Sync + 'a;
+
+/// Why there is nothing to judge.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Trouble {
+    /// The scene or the golden can't be used; why.
+    Input(String),
+    /// There is no engine, or it failed; why.
+    Device(String),
+}
+
+impl From<String> for Trouble {
+    fn from(why: String) -> Self {
+        Self::Input(why)
+    }
+}
+
+impl From<Trouble> for Outcome {
+    fn from(trouble: Trouble) -> Self {
+        match trouble {
+            Trouble::Input(why) => Outcome::Unusable(why),
+            Trouble::Device(why) => Outcome::NoDevice(why),
+        }
+    }
+}
 
 /// A scene, a golden picture, or both, under one name.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -53,8 +77,10 @@ pub enum Outcome {
     New,
     /// A golden without a scene.
     Orphaned,
-    /// The scene or the golden can't be used, or nothing could be rendered; why.
+    /// The scene or the golden can't be used; why.
     Unusable(String),
+    /// Nothing could be rendered; why.
+    NoDevice(String),
     /// A golden was written.
     Blessed(Bless),
 }
@@ -68,6 +94,7 @@ impl Outcome {
             Outcome::New => "new",
             Outcome::Orphaned => "orphaned",
             Outcome::Unusable(_) => "unusable",
+            Outcome::NoDevice(_) => "no device",
             Outcome::Blessed(_) => "blessed",
         }
     }
@@ -86,7 +113,7 @@ impl Outcome {
                 "no {}: remove the golden if that is meant",
                 case.scene_path().display()
             ),
-            Outcome::Unusable(why) => why.clone(),
+            Outcome::Unusable(why) | Outcome::NoDevice(why) => why.clone(),
             Outcome::Blessed(b) => b.to_string(),
         }
     }
@@ -128,13 +155,19 @@ impl Case {
     ) -> Option<(Outcome, Option<[Picture; 2]>)> {
         match (self.scene, self.golden) {
             (false, _) => return Some((Outcome::Orphaned, None)),
-            (_, false) => return Some((Outcome::New, None)),
+            (_, false) => {
+                let outcome = match parse::read(&self.scene_path()) {
+                    Ok(_) => Outcome::New,
+                    Err(e) => Outcome::Unusable(text(e)),
+                };
+                return Some((outcome, None));
+            }
             _ => {}
         }
         match self.compare(engine, limits, stop) {
             Ok(Some((outcome, pictures))) => Some((outcome, Some(pictures))),
             Ok(None) => None,
-            Err(why) => Some((Outcome::Unusable(why), None)),
+            Err(trouble) => Some((trouble.into(), None)),
         }
     }
 
@@ -143,7 +176,7 @@ impl Case {
         engine: &MakeEngine,
         limits: &Limits,
         stop: &AtomicBool,
-    ) -> Result<Option<(Outcome, [Picture; 2])>, String> {
+    ) -> Result<Option<(Outcome, [Picture; 2])>, Trouble> {
         let golden = Picture::read(&self.golden_path()).map_err(text)?;
         let facts = golden::Facts::read(&golden)?;
         let source = parse::read_text(&self.scene_path()).map_err(text)?;
@@ -159,7 +192,8 @@ impl Case {
                 self.scene_path().display(),
                 short(&facts.scene_hash),
                 short(&provenance.scene_hash)
-            ));
+            )
+            .into());
         }
         let world = World::new(&scene, settings.size);
         let (mut engine, tile) = engine(&world, &settings)?;
@@ -218,7 +252,7 @@ fn render(
     provenance: &mut Provenance,
     samples: u64,
     stop: &AtomicBool,
-) -> Result<bool, String> {
+) -> Result<bool, Trouble> {
     let device = engine.device().clone();
     let job = Job {
         tiles: run::tiles(&[film.bounds], tile_pixels),
@@ -235,12 +269,13 @@ fn render(
     provenance.add_work(&device, tally.counters, tally.seconds);
     provenance.describe(film);
     if let Some((x, y, n)) = tally.counters.first_nonfinite {
-        return Err(format!(
+        return Err(Trouble::Input(format!(
             "{} samples were not finite, the first at pixel {x}, {y}, sample {n}",
             tally.counters.nonfinite
-        ));
+        )));
     }
-    Ok(reason.map_err(text)? != StopReason::Interrupted)
+    let reason = reason.map_err(|e| Trouble::Device(text(e)))?;
+    Ok(reason != StopReason::Interrupted)
 }
 
 /// The scenes of `dir` and the goldens of `dir/golden` whose name contains `filter`, by name.

@@ -22,14 +22,23 @@ pub struct Done {
 
 /// The last line of a list: how many of each.
 pub fn summary(done: &[Done]) -> String {
-    let words = ["passed", "FAILED", "new", "orphaned", "unusable", "blessed"];
+    let words = [
+        "passed",
+        "FAILED",
+        "new",
+        "orphaned",
+        "unusable",
+        "no device",
+        "blessed",
+    ];
     let count = |word: &str| done.iter().filter(|d| d.outcome.word() == word).count();
     let told: Vec<String> = words
         .into_iter()
         .filter(|w| count(w) > 0)
         .map(|w| format!("{} {}", count(w), w.to_lowercase()))
         .collect();
-    format!("{} scenes: {}", done.len(), told.join(", "))
+    let s = if done.len() == 1 { "" } else { "s" };
+    format!("{} scene{s}: {}", done.len(), told.join(", "))
 }
 
 /// JUnit XML: a failure for what differs or is new or orphaned, an error for what could not be compared.
@@ -73,7 +82,7 @@ pub fn junit(done: &[Done]) -> String {
 }
 
 fn unusable(done: &Done) -> bool {
-    matches!(done.outcome, Outcome::Unusable(_))
+    matches!(done.outcome, Outcome::Unusable(_) | Outcome::NoDevice(_))
 }
 
 /// Text for XML, which knows no control characters but tab and line break.

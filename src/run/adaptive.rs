@@ -257,6 +257,11 @@ impl Run<'_> {
     }
 }
 
+/// The longer side.
+fn longest_side(r: &Rect) -> u32 {
+    r.width().max(r.height())
+}
+
 /// Joins rectangles beside and below each other that lack the same samples, up to `most` pixels.
 fn joined(mut calls: Vec<(Rect, Range<u64>)>, most: u64) -> Vec<(Rect, Range<u64>)> {
     let mut join = |key: fn(&Rect) -> [u32; 4], fits: fn(&Rect, &Rect) -> bool| {
@@ -268,7 +273,7 @@ fn joined(mut calls: Vec<(Rect, Range<u64>)>, most: u64) -> Vec<(Rect, Range<u64
                     if *same == samples
                         && fits(last, &rect)
                         && last.area() + rect.area() <= most
-                        && last.union(&rect).width() <= super::MAX_TILE_WIDTH =>
+                        && longest_side(&last.union(&rect)) <= super::MAX_TILE_SIDE =>
                 {
                     *last = last.union(&rect);
                 }

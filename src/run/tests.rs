@@ -126,6 +126,14 @@ fn tiles_hold_each_pixel_once_within_the_limit() {
         }
     }
     assert!(cut.iter().all(|t| t.area() <= 1000));
+    // Textures have a limit: no tile is long, neither across nor down.
+    for size in [[1, 16384], [1, 65536], [4, 20000], [65536, 1]] {
+        let cut = tiles(&[Rect::whole(size)], 1 << 20);
+        assert!(
+            cut.iter().all(|t| t.width().max(t.height()) <= 4096),
+            "{size:?}"
+        );
+    }
     // Wide pictures are cut into columns, and a row longer than the limit is a tile of its own.
     assert_eq!(tiles(&[r(0, 0, 65536, 2)], 1000).len(), 32);
     assert!(
@@ -222,19 +230,56 @@ fn forecasts_of_the_error_come_true() {
 
 #[test]
 fn checks_are_whole_rounds_of_all_replicates() {
-    let mut job = job([1, 1], 1, 0..1 << 20);
-    let checks = |job: &Job| {
-        let after = |count: &u64| Some(next_look(*count, job));
-        let counts = std::iter::successors(Some(next_look(0, job)), after);
+    let checks = |round: u64| {
+        let after = |count: &u64| Some(next_check(*count, round));
+        let counts = std::iter::successors(Some(next_check(0, round)), after);
         counts.take(6).collect::<Vec<_>>()
     };
-    assert_eq!(checks(&job), [64, 256, 1024, 4096, 16384, 65536]);
-    job.error = Some(0.1);
-    assert_eq!(checks(&job), [16, 32, 48, 64, 80, 112]);
-    job.round = 1;
-    assert_eq!(next_look(0, &job), 16);
-    job.round = 9;
-    assert_eq!(next_look(0, &job), 36);
+    assert_eq!(checks(4), [16, 32, 48, 64, 80, 112]);
+    assert_eq!(next_check(0, 1), 16);
+    assert_eq!(next_check(0, 9), 36);
+    // A forecast may ask for what lies beyond all samples, whatever the round.
+    for round in [1, 4, 9, 1 << 20] {
+        assert!(next_check(u64::MAX, round) > u64::from(u32::MAX));
+    }
+}
+
+/// An error that no run reaches is no reason not to end.
+#[test]
+fn errors_out_of_reach_leave_the_other_conditions() {
+    let size = [8, 8];
+    for error in [1e-8, 1e-20, 1e-100, 1e-320] {
+        let mut film = Film::new(size, Rect::whole(size), 2);
+        let mut job = job(size, 16, 0..u64::from(u32::MAX));
+        (job.error, job.time) = (Some(error), Some(Duration::from_millis(50)));
+        assert_eq!(run(&job, &mut Fake::new(), &mut film), StopReason::Time);
+    }
+}
+
+/// What progress shows is of the whole picture.
+#[test]
+fn a_tally_is_complete_once_every_pixel_has_a_sample() {
+    let size = [8, 8];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let job = job(size, 16, 3..40);
+    let stop = AtomicBool::new(false);
+    let mut engine = Fake::new();
+    let mut run = Run::new(&job, &mut engine, &mut film, &stop);
+    run.go(|film, tally| {
+        let covered: u64 = film.coverage.cells().map(|(r, _)| r.area()).sum();
+        assert_eq!(tally.complete, covered == 64);
+        Ok::<(), EngineError>(())
+    })
+    .unwrap();
+    assert!(run.tally.complete);
+    assert!(Run::new(&job, &mut engine, &mut film, &stop).tally.complete);
+    let mut later = job.clone();
+    later.samples = 40..50;
+    assert!(
+        !Run::new(&later, &mut engine, &mut film, &stop)
+            .tally
+            .complete
+    );
 }
 
 #[test]

@@ -10,7 +10,7 @@ mod open;
 pub(super) use coincide::may_coincide;
 
 use super::source::quoted;
-use super::{Bsdf, Diagnostic, Primitive, Scene};
+use super::{Bsdf, Diagnostic, Place, Primitive, Scene};
 use glam::DVec3;
 
 /// Scenes with more primitives and lights than this are not searched for things that go wrong
@@ -26,16 +26,16 @@ const COINCIDENT: f64 = crate::world::COINCIDENT;
 /// Warnings of one kind.
 #[derive(Default)]
 struct Warnings {
-    /// The first [`MAX_ALIKE`]: line in the scene file, 0 for the whole file, and message.
-    first: Vec<(usize, String)>,
+    /// The first [`MAX_ALIKE`]: place in the scene file, none for the whole file, and message.
+    first: Vec<(Place, String)>,
     /// How many there are besides.
     more: usize,
 }
 
 impl Warnings {
-    fn add(&mut self, line: usize, message: impl FnOnce() -> String) {
+    fn add(&mut self, place: Place, message: impl FnOnce() -> String) {
         if self.first.len() < MAX_ALIKE {
-            self.first.push((line, message()));
+            self.first.push((place, message()));
         } else {
             self.more += 1;
         }
@@ -56,7 +56,7 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
         kinds.push(lights::unseen(scene));
     } else {
         let mut skipped = Warnings::default();
-        skipped.add(0, || {
+        skipped.add(Place::default(), || {
             format!(
                 "{things} primitives and lights: with more than {MAX_PAIRWISE} they are not \
                  searched for surfaces that coincide or cross, or hide a light"
@@ -70,13 +70,15 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
 
     let mut diagnostics = Vec::new();
     for Warnings { first, more } in kinds {
-        let counted = (more > 0).then(|| (0, format!("{more} more warnings like the last")));
+        let counted = format!("{more} more warnings like the last");
+        let counted = (more > 0).then(|| (Place::default(), counted));
         let all = first.into_iter().chain(counted);
-        diagnostics.extend(all.map(|(line, message)| Diagnostic {
+        diagnostics.extend(all.map(|(place, message)| Diagnostic {
             path: scene.path.clone(),
-            line,
-            column: 0,
+            line: place.line,
+            column: place.column,
             message,
+            unreadable: false,
         }));
     }
     diagnostics
@@ -84,28 +86,25 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
 
 /// Materials that do nothing.
 fn materials(scene: &Scene) -> Warnings {
-    let mut users = vec![None; scene.materials.len()];
+    let mut used = vec![false; scene.materials.len()];
     for p in &scene.primitives {
-        users[p.material].get_or_insert(p.line);
+        used[p.material] = true;
     }
     let mut warnings = Warnings::default();
-    for (material, user) in scene.materials.iter().zip(users) {
-        let name = quoted(&material.name);
-        match (user, material.bsdf) {
-            (None, _) => warnings.add(0, || format!("material {name} is used by nothing")),
-            (
-                Some(line),
-                Bsdf::Dielectric {
-                    ior: 1.0,
-                    transmittance,
-                },
-            ) => {
+    for (material, used) in scene.materials.iter().zip(used) {
+        let (name, place) = (quoted(&material.name), material.place);
+        match material.bsdf {
+            _ if !used => warnings.add(place, || format!("material {name} is used by nothing")),
+            Bsdf::Dielectric {
+                ior: 1.0,
+                transmittance,
+            } => {
                 let effect = if transmittance == DVec3::ONE {
                     "is invisible"
                 } else {
                     "only tints"
                 };
-                warnings.add(line, || {
+                warnings.add(place, || {
                     format!("material {name} has ior 1: it does not bend light and {effect}")
                 });
             }
@@ -238,7 +237,7 @@ radiance = [9, 9, 9]
         let mut scene =
             scene(&"[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'red'\n".repeat(2));
         for p in &mut scene.primitives {
-            p.line = 0;
+            (p.line, p.column) = (0, 0);
         }
         let messages: Vec<String> = lint(&scene).iter().map(|w| w.message.clone()).collect();
         let expected = "the sphere coincides with the sphere, which is met first from either side";

@@ -5,7 +5,7 @@ use super::value::{
     Angle, Count, Direction, Exponent, Ior, LARGEST_STRATA, Point, Radiance, Radius, Resolution,
     SMALLEST, Share, Text, Value, normalized,
 };
-use super::{Bsdf, Camera, Light, RenderHints, Shape};
+use super::{Bsdf, Camera, Light, Place, RenderHints, Shape};
 use crate::settings::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA};
 use glam::DVec3;
 
@@ -343,8 +343,8 @@ pub(super) fn lights(t: &mut impl Table) -> Option<String> {
     t.required::<Text>("file", about).map(|f| f.0)
 }
 
-/// `[[light]]`, at `line` of the file.
-pub(super) fn light(t: &mut impl Table, line: usize) -> Option<Light> {
+/// `[[light]]`, at `place` in the file.
+pub(super) fn light(t: &mut impl Table, place: Place) -> Option<Light> {
     let center = t.required::<Point>("center", "Centre.");
     let about = "Points to the side that emits; any length. The other side is black.";
     let normal = t.required::<Direction>("normal", about);
@@ -356,6 +356,7 @@ pub(super) fn light(t: &mut impl Table, line: usize) -> Option<Light> {
         normal: normal?.0,
         radius: radius?.0,
         radiance: radiance?.0,
-        line,
+        line: place.line,
+        column: place.column,
     })
 }

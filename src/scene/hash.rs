@@ -171,6 +171,7 @@ impl Hasher {
             radius,
             radiance,
             line: _,
+            column: _,
         } = *light;
         self.vector(center);
         self.direction(normal);
@@ -182,7 +183,7 @@ impl Hasher {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Material, RenderHints};
+    use crate::scene::{Material, Place, RenderHints};
     use crate::settings::Overrides;
 
     fn scene() -> Scene {
@@ -191,6 +192,7 @@ mod tests {
         };
         Scene {
             path: "a.toml".into(),
+            row_files: Vec::new(),
             title: Some("one".into()),
             camera: Camera {
                 eye: DVec3::new(0.0, 1.0, 4.0),
@@ -204,10 +206,12 @@ mod tests {
                 Material {
                     name: "grey".into(),
                     bsdf: diffuse(0.5),
+                    place: Place::default(),
                 },
                 Material {
                     name: "white".into(),
                     bsdf: diffuse(0.75),
+                    place: Place::default(),
                 },
             ],
             primitives: vec![
@@ -218,6 +222,7 @@ mod tests {
                     },
                     material: 1,
                     line: 3,
+                    column: 0,
                 },
                 Primitive {
                     shape: Shape::Plane {
@@ -226,6 +231,7 @@ mod tests {
                     },
                     material: 1,
                     line: 7,
+                    column: 0,
                 },
             ],
             lights: vec![Light {
@@ -234,6 +240,7 @@ mod tests {
                 radius: 0.4,
                 radiance: DVec3::splat(12.0),
                 line: 9,
+                column: 0,
             }],
         }
     }

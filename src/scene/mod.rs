@@ -9,6 +9,7 @@ pub mod generate;
 pub mod hash;
 pub(crate) mod order;
 pub mod parse;
+mod reader;
 mod rows;
 pub mod schema;
 mod source;
@@ -26,6 +27,8 @@ use std::path::PathBuf;
 pub struct Scene {
     /// Where it was read from; empty for scenes made in memory.
     pub path: PathBuf,
+    /// The files of rows that it names.
+    pub row_files: Vec<PathBuf>,
     /// `title`, if the file has one.
     pub title: Option<String>,
     /// The pinhole camera.
@@ -73,6 +76,16 @@ pub struct Material {
     pub name: String,
     /// How it scatters.
     pub bsdf: Bsdf,
+    /// Where its table stands in the file.
+    pub place: Place,
+}
+
+/// A place in a file: line and column, in characters, from 1. 0 for scenes made in memory, and for a whole line or file.
+#[expect(missing_docs, reason = "what they are is said above")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Place {
+    pub line: usize,
+    pub column: usize,
 }
 
 /// Scattering models; colours are linear RGB, 0..=1 per channel.
@@ -115,6 +128,16 @@ pub struct Primitive {
     pub material: usize,
     /// Line of its table in the file, from 1; 0 for scenes made in memory.
     pub line: usize,
+    /// Column of its table, likewise.
+    pub column: usize,
+}
+
+impl Primitive {
+    /// Where its table stands in the file.
+    pub fn place(&self) -> Place {
+        let Self { line, column, .. } = *self;
+        Place { line, column }
+    }
 }
 
 /// Analytic shapes. Normals have unit length.
@@ -152,6 +175,16 @@ pub struct Light {
     pub radiance: DVec3,
     /// Line of its table in the file, from 1; 0 for scenes made in memory.
     pub line: usize,
+    /// Column of its table, likewise.
+    pub column: usize,
+}
+
+impl Light {
+    /// Where its table stands in the file.
+    pub fn place(&self) -> Place {
+        let Self { line, column, .. } = *self;
+        Place { line, column }
+    }
 }
 
 impl Shape {
@@ -177,6 +210,8 @@ pub struct Diagnostic {
     pub column: usize,
     /// What is wrong, the value found, and the rule.
     pub message: String,
+    /// Whether all that is wrong is that a file which is named there can't be read.
+    pub unreadable: bool,
 }
 
 impl fmt::Display for Diagnostic {

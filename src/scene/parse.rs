@@ -1,16 +1,15 @@
 //! Reads scene files: TOML with spans, then [`format`](super::format)'s rules, then what holds
 //! between tables. Every independent error is reported, with its place.
 
-use super::format::{self, Found, MaterialKind, Need, ShapeKind, Table};
-use super::rows;
-use super::schema;
+use super::format::{self, ShapeKind, Table};
+use super::reader::Reader;
 use super::source::{Faults, Source, quoted, suggestion};
-use super::value::{Text, Value};
-use super::{Bsdf, Diagnostic, Light, Material, Primitive, RenderHints, Scene};
-use std::borrow::Cow;
+use super::value::Text;
+use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Scene};
+use super::{rows, schema};
+use crate::output::error::reason;
 use std::fs::File;
 use std::io::{self, Read};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -26,7 +25,7 @@ const MAX_RECOVERED_BYTES: usize = 1 << 16;
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file is missing, a directory, or can't be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot read: {}", path.display(), reason(source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -146,6 +145,10 @@ fn syntax<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeTable<'a>> {
                 "duplicate {}: a key or [table] stands once; only [[tables]] repeat",
                 quoted(&found)
             ),
+            // The parser takes whatever is no other value for a string.
+            message if found.is_empty() && message.starts_with("string values must be quoted") => {
+                "not TOML: a value is missing".into()
+            }
             message if found.is_empty() => format!("not TOML: {message}"),
             message => format!("not TOML: {message}; found `{found}`"),
         };
@@ -181,10 +184,10 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
     };
     let materials = materials(&mut file);
     let primitives = primitives(&mut file, &materials);
-    let mut lights: Vec<Option<Light>> = file.each("light", |t, line| format::light(t, line));
-    for more in file.each("lights", |t, line| {
+    let mut lights: Vec<Option<Light>> = file.each("light", |t, place| format::light(t, place));
+    for more in file.each("lights", |t, place| {
         let name = format::lights(t)?;
-        t.rows(&name, |path, text| rows::lights(path, text, line))
+        t.rows(&name, |path, text| rows::lights(path, text, place))
     }) {
         match more {
             Some(more) => lights.extend(more.into_iter().map(Some)),
@@ -199,12 +202,15 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
     }
     file.refuse_unknown_keys();
 
-    let materials: Option<Vec<Material>> = materials
-        .into_iter()
-        .map(|(name, bsdf)| Some(Material { name, bsdf: bsdf? }))
-        .collect();
+    let complete = |m: Named| {
+        let Named { name, bsdf, place } = m;
+        let bsdf = bsdf?;
+        Some(Material { name, bsdf, place })
+    };
+    let materials: Option<Vec<Material>> = materials.into_iter().map(complete).collect();
     Some(Scene {
         path: source.path().to_owned(),
+        row_files: row_files(source, root),
         title: title.map(|t| t.0),
         camera: camera?,
         render: render?,
@@ -214,8 +220,26 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
     })
 }
 
-/// All names, in order, and what was wrong with none of them.
-fn materials(file: &mut Reader) -> Vec<(String, Option<Bsdf>)> {
+/// The files of rows that the scene names.
+fn row_files(source: &Source, root: &DeTable) -> Vec<PathBuf> {
+    let tables = |key: &str| root.get(key).and_then(|v| v.get_ref().as_array());
+    let all = ["spheres", "lights"].into_iter().filter_map(tables);
+    let names = all
+        .flatten()
+        .filter_map(|t| t.get_ref().as_table()?.get("file")?.get_ref().as_str());
+    names.map(|name| source.beside(name)).collect()
+}
+
+/// A material as far as it is known.
+struct Named {
+    name: String,
+    /// None when it is wrong.
+    bsdf: Option<Bsdf>,
+    place: Place,
+}
+
+/// All materials in the order of their names.
+fn materials(file: &mut Reader) -> Vec<Named> {
     let Some(all) = file.table("material", "[material.NAME]") else {
         return Vec::new();
     };
@@ -233,9 +257,13 @@ fn materials(file: &mut Reader) -> Vec<(String, Option<Bsdf>)> {
                 None
             }
         };
-        materials.push((name.get_ref().to_string(), bsdf));
+        materials.push(Named {
+            name: name.get_ref().to_string(),
+            bsdf,
+            place: all.source.table_place(value.span().start),
+        });
     }
-    materials.sort_by(|a, b| a.0.cmp(&b.0));
+    materials.sort_by(|a, b| a.name.cmp(&b.name));
     materials
 }
 
@@ -250,18 +278,20 @@ fn source_name(name: &str) -> String {
 }
 
 /// The primitives in the order of [`Scene::primitives`].
-fn primitives(file: &mut Reader, materials: &[(String, Option<Bsdf>)]) -> Vec<Option<Primitive>> {
+fn primitives(file: &mut Reader, materials: &[Named]) -> Vec<Option<Primitive>> {
     let mut primitives = Vec::new();
     for kind in ShapeKind::ALL {
-        primitives.extend(file.each(kind.name(), |t, line| {
+        primitives.extend(file.each(kind.name(), |t, place| {
             let (shape, name) = format::primitive(t, kind)?;
-            let found = materials.binary_search_by(|m| m.0.as_str().cmp(&name));
-            let Ok(material) = found else {
-                t.refuse("material", unknown_material(&name, materials));
-                return None;
+            let material = match find(&name, materials) {
+                Ok(material) => material,
+                Err(message) => {
+                    t.refuse("material", message);
+                    return None;
+                }
             };
             if kind == ShapeKind::Disk
-                && matches!(materials[material].1, Some(Bsdf::Dielectric { .. }))
+                && matches!(materials[material].bsdf, Some(Bsdf::Dielectric { .. }))
             {
                 let message = format!(
                     "material {} is dielectric, but a disk bounds no solid; \
@@ -274,11 +304,12 @@ fn primitives(file: &mut Reader, materials: &[(String, Option<Bsdf>)]) -> Vec<Op
             Some(Primitive {
                 shape,
                 material,
-                line,
+                line: place.line,
+                column: place.column,
             })
         }));
         if kind == ShapeKind::Sphere {
-            for more in file.each("spheres", |t, line| spheres(t, line, materials)) {
+            for more in file.each("spheres", |t, place| spheres(t, place, materials)) {
                 match more {
                     Some(more) => primitives.extend(more.into_iter().map(Some)),
                     None => primitives.push(None),
@@ -295,11 +326,17 @@ fn primitives(file: &mut Reader, materials: &[(String, Option<Bsdf>)]) -> Vec<Op
     primitives
 }
 
-fn unknown_material(name: &str, materials: &[(String, Option<Bsdf>)]) -> String {
+/// Which of `materials`, ordered by name, it is; an error says what there is instead.
+fn find(name: &str, materials: &[Named]) -> Result<usize, String> {
+    let found = materials.binary_search_by(|m| m.name.as_str().cmp(name));
+    found.map_err(|_| unknown_material(name, materials))
+}
+
+fn unknown_material(name: &str, materials: &[Named]) -> String {
     /// More names would hide the message.
     const LISTED: usize = 12;
-    let names = || materials.iter().map(|m| m.0.as_str());
-    let mut defined: Vec<String> = names().take(LISTED).map(super::source::shorten).collect();
+    let names = || materials.iter().map(|m| m.name.as_str());
+    let mut defined: Vec<String> = names().take(LISTED).map(source_name).collect();
     if materials.len() > LISTED {
         defined.push(format!("and {} more", materials.len() - LISTED));
     }
@@ -316,16 +353,9 @@ fn unknown_material(name: &str, materials: &[(String, Option<Bsdf>)]) -> String 
 }
 
 /// The spheres of a `[[spheres]]`.
-fn spheres(
-    t: &mut Reader,
-    line: usize,
-    materials: &[(String, Option<Bsdf>)],
-) -> Option<Vec<Primitive>> {
+fn spheres(t: &mut Reader, place: Place, materials: &[Named]) -> Option<Vec<Primitive>> {
     let (name, material) = format::spheres(t)?;
-    let find = |name: &str| {
-        let found = materials.binary_search_by(|m| m.0.as_str().cmp(name));
-        found.map_err(|_| unknown_material(name, materials))
-    };
+    let find = |name: &str| find(name, materials);
     let common = match material.as_deref().map(find) {
         Some(Err(message)) => {
             t.refuse("material", message);
@@ -335,222 +365,6 @@ fn spheres(
         None => None,
     };
     t.rows(&name, |path, text| {
-        rows::spheres(path, text, line, common, find)
+        rows::spheres(path, text, place, common, find)
     })
-}
-
-/// A table of the file that is being read.
-struct Reader<'a, 't> {
-    source: &'a Source<'a>,
-    faults: &'a mut Faults,
-    /// How it is written: `[camera]`, `[[sphere]]`.
-    what: &'a str,
-    /// Where its header stands; none for the file itself.
-    header: Option<Range<usize>>,
-    table: &'a DeTable<'t>,
-    /// The keys it may have: those asked for.
-    known: Vec<&'static str>,
-}
-
-impl Table for Reader<'_, '_> {
-    fn find<T: Value>(&mut self, key: &'static str, need: Need<T>, _: &'static str) -> Found<T> {
-        self.known.push(key);
-        let Some(found) = self.table.get(key) else {
-            if matches!(need, Need::Required) {
-                let message = format!("{} lacks {key}, which must be {}", self.what, T::rule());
-                self.faults.push(self.place(), message);
-            }
-            return Found::Absent;
-        };
-        match T::read(found) {
-            Ok(value) => Found::Value(value),
-            Err(wrong) => {
-                let index = wrong.index.map_or_else(String::new, |i| format!("[{i}]"));
-                let value = self.source.quote(wrong.span.clone());
-                let message = format!("{key}{index} is {value}; {key} must be {}", T::rule());
-                self.faults.push(Some(wrong.span.start), message);
-                Found::Wrong
-            }
-        }
-    }
-
-    fn refuse(&mut self, key: &str, message: String) {
-        let place = match self.table.get(key) {
-            Some(value) => Some(value.span().start),
-            None => self.place(),
-        };
-        self.faults.push(place, message);
-    }
-}
-
-impl<'a, 't> Reader<'a, 't> {
-    fn new(
-        source: &'a Source<'a>,
-        faults: &'a mut Faults,
-        what: &'a str,
-        header: Option<Range<usize>>,
-        table: &'a DeTable<'t>,
-    ) -> Self {
-        Self {
-            source,
-            faults,
-            what,
-            header,
-            table,
-            known: Vec::new(),
-        }
-    }
-
-    /// What `read` makes of the file of rows `name`, which lies beside the scene file or where `name` leads from there.
-    fn rows<T>(
-        &mut self,
-        name: &str,
-        read: impl FnOnce(&Path, &str) -> Result<Vec<T>, rows::Wrong>,
-    ) -> Option<Vec<T>> {
-        let path = self
-            .source
-            .path()
-            .parent()
-            .unwrap_or(Path::new(""))
-            .join(name);
-        let text = match self.source.rows() {
-            Some(text) => Ok(Cow::Borrowed(text)),
-            None => rows::read(&path).map(Cow::Owned),
-        };
-        match text.and_then(|text| read(&path, &text)) {
-            Ok(rows) => Some(rows),
-            Err(rows::Wrong::File(message)) => {
-                self.refuse("file", format!("cannot read {}: {message}", path.display()));
-                None
-            }
-            Err(rows::Wrong::Content(errors)) => {
-                self.faults.push_elsewhere(errors);
-                None
-            }
-        }
-    }
-
-    fn place(&self) -> Option<usize> {
-        self.header.as_ref().map(|h| h.start)
-    }
-
-    /// Whether `key` is there, but no array of tables.
-    fn is_wrong(&self, key: &str) -> bool {
-        self.table.get(key).is_some_and(|v| !v.get_ref().is_array())
-    }
-
-    /// What `read` finds, and errors for all that it did not ask for.
-    fn read_all<T>(&mut self, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
-        let value = read(self);
-        self.refuse_unknown_keys();
-        value
-    }
-
-    /// The one table `key`, written `what`, if it is there.
-    fn table(&mut self, key: &'static str, what: &'static str) -> Option<Reader<'_, 't>> {
-        self.known.push(key);
-        let value = self.table.get(key)?;
-        match value.get_ref() {
-            DeValue::Table(table) => Some(Reader::new(
-                self.source,
-                self.faults,
-                what,
-                Some(value.span()),
-                table,
-            )),
-            _ => {
-                let found = self.source.quote(value.span());
-                let message = format!("{key} is {found}, but must be one table, {what}");
-                self.faults.push(Some(value.span().start), message);
-                None
-            }
-        }
-    }
-
-    /// What `read` makes of each of the tables `[[key]]` and its line, in file order; none where
-    /// something was wrong.
-    fn each<T>(
-        &mut self,
-        key: &'static str,
-        mut read: impl FnMut(&mut Reader<'_, 't>, usize) -> Option<T>,
-    ) -> Vec<Option<T>> {
-        self.known.push(key);
-        let Some(value) = self.table.get(key) else {
-            return Vec::new();
-        };
-        let what = format!("[[{key}]]");
-        let DeValue::Array(items) = value.get_ref() else {
-            let message = format!("{key} must be an array of tables: write {what} for each");
-            self.faults.push(Some(value.span().start), message);
-            return Vec::new();
-        };
-        let mut values = Vec::with_capacity(items.len());
-        for item in items.iter() {
-            let at = item.span().start;
-            let DeValue::Table(table) = item.get_ref() else {
-                let found = self.source.quote(item.span());
-                let message = format!("{what} is {found}, but must be a table");
-                self.faults.push(Some(at), message);
-                values.push(None);
-                continue;
-            };
-            let line = self.source.line(at);
-            let header = Some(item.span());
-            let mut t = Reader::new(self.source, self.faults, &what, header, table);
-            values.push(t.read_all(|t| read(t, line)));
-        }
-        values
-    }
-
-    /// This table as a `[material.NAME]`.
-    fn material(mut self) -> Option<Bsdf> {
-        let name = self.required::<Text>("type", "")?.0;
-        let names = || MaterialKind::ALL.iter().map(|k| k.name());
-        let Some(&kind) = MaterialKind::ALL.iter().find(|k| k.name() == name) else {
-            let message = format!(
-                "unknown material type {}; allowed: {}{}",
-                quoted(&name),
-                names().collect::<Vec<_>>().join(", "),
-                suggestion(&name, names())
-            );
-            self.refuse("type", message);
-            return None;
-        };
-        self.read_all(|t| format::material(t, kind))
-    }
-
-    fn refuse_unknown_keys(&mut self) {
-        for key in self
-            .table
-            .keys()
-            .filter(|k| !self.known.contains(&k.get_ref().as_ref()))
-        {
-            let word = key.get_ref().as_ref();
-            let message = format!(
-                "unknown key {} in {}; allowed: {}{}{}",
-                quoted(word),
-                self.what,
-                self.known.join(", "),
-                suggestion(word, self.known.iter().copied()),
-                self.owners(word)
-            );
-            self.faults.push(Some(key.span().start), message);
-        }
-    }
-
-    /// Which material types have `key`, when this is a material of another.
-    fn owners(&self, key: &str) -> String {
-        if !self.known.contains(&"type") {
-            return String::new();
-        }
-        let owners: Vec<&str> = MaterialKind::ALL
-            .into_iter()
-            .filter(|&kind| schema::material_keys(kind).iter().any(|k| k == key))
-            .map(MaterialKind::name)
-            .collect();
-        if owners.is_empty() {
-            return String::new();
-        }
-        format!("; it belongs to {}", owners.join(" and "))
-    }
 }

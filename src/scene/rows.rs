@@ -3,9 +3,10 @@
 //! The first row names the columns, in any order; every other row is one thing. Fields are numbers and names of materials:
 //! there is nothing to quote.
 
-use super::source::{quoted, suggestion};
-use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius, Value};
-use super::{Diagnostic, Light, Primitive, Shape};
+use super::source::{Source, quoted, suggestion};
+use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius};
+use super::{Diagnostic, Light, Place, Primitive, Shape};
+use crate::output::error::reason;
 use glam::DVec3;
 use std::fs::File;
 use std::io::Read as _;
@@ -23,18 +24,18 @@ const MATERIAL: &str = "material";
 /// Columns of lights: centre, normal, radius, radiance.
 const LIGHT: [&str; 10] = ["x", "y", "z", "nx", "ny", "nz", "radius", "r", "g", "b"];
 
-/// What is wrong with a file of rows: that it can't be read, or its content.
+/// What is wrong with a file of rows: that it can't be read, and why, or its content.
 pub(super) enum Wrong {
-    File(String),
+    Unreadable(String),
     Content(Vec<Diagnostic>),
 }
 
-/// The spheres in the text of a file; `material` finds one by name, or says what is wrong with it, and `common` is that of all if
-/// there is no such column.
+/// The spheres in the text of a file, which is named at `place` of the scene file; `material` finds one by name, or says what is
+/// wrong with it, and `common` is that of all if there is no such column.
 pub(super) fn spheres(
     path: &Path,
     text: &str,
-    line: usize,
+    place: Place,
     common: Option<usize>,
     material: impl Fn(&str) -> Result<usize, String>,
 ) -> Result<Vec<Primitive>, Wrong> {
@@ -53,15 +54,16 @@ pub(super) fn spheres(
         spheres.push(Primitive {
             shape: Shape::Sphere { center, radius },
             material,
-            line,
+            line: place.line,
+            column: place.column,
         });
         Ok(())
     })?;
     Ok(spheres)
 }
 
-/// The lights in the text of a file.
-pub(super) fn lights(path: &Path, text: &str, line: usize) -> Result<Vec<Light>, Wrong> {
+/// The lights in the text of a file, which is named at `place` of the scene file.
+pub(super) fn lights(path: &Path, text: &str, place: Place) -> Result<Vec<Light>, Wrong> {
     let mut rows = Rows::new(path, text);
     let c = rows.header(&LIGHT, &[])?;
     let mut lights = Vec::new();
@@ -71,7 +73,8 @@ pub(super) fn lights(path: &Path, text: &str, line: usize) -> Result<Vec<Light>,
             normal: row.vector::<Direction>([c[3], c[4], c[5]])?.0,
             radius: row.number::<Radius>(c[6])?.0,
             radiance: row.vector::<Radiance>([c[7], c[8], c[9]])?.0,
-            line,
+            line: place.line,
+            column: place.column,
         });
         Ok(())
     })?;
@@ -80,7 +83,8 @@ pub(super) fn lights(path: &Path, text: &str, line: usize) -> Result<Vec<Light>,
 
 /// The text of a file of rows, of at most [`MAX_ROWS_BYTES`].
 pub(super) fn read(path: &Path) -> Result<String, Wrong> {
-    let system = |e: std::io::Error| Wrong::File(e.to_string());
+    let system = |e: std::io::Error| Wrong::Unreadable(reason(&e));
+    let wrong = |place: Place, message: String| Wrong::Content(vec![about(path, place, message)]);
     let file = File::open(path).map_err(system)?;
     let mut bytes = Vec::new();
     file.take(MAX_ROWS_BYTES + 1)
@@ -88,16 +92,36 @@ pub(super) fn read(path: &Path) -> Result<String, Wrong> {
         .map_err(system)?;
     if bytes.len() as u64 > MAX_ROWS_BYTES {
         let limit = MAX_ROWS_BYTES >> 20;
-        return Err(Wrong::File(format!(
-            "a file of rows has at most {limit} MiB"
-        )));
+        let message = format!("is larger than a file of rows may be, {limit} MiB");
+        return Err(wrong(Place::default(), message));
     }
-    String::from_utf8(bytes).map_err(|_| Wrong::File("it is not UTF-8 text".into()))
+    String::from_utf8(bytes).map_err(|e| {
+        let (good, bad) = e.as_bytes().split_at(e.utf8_error().valid_up_to());
+        let good = String::from_utf8_lossy(good);
+        let place = Source::new(path, &good).place(good.len());
+        let byte = bad.first().copied().unwrap_or_default();
+        wrong(
+            place,
+            format!("byte 0x{byte:02x} is not UTF-8, but a file of rows is UTF-8 text"),
+        )
+    })
+}
+
+fn about(path: &Path, place: Place, message: String) -> Diagnostic {
+    Diagnostic {
+        path: path.to_owned(),
+        line: place.line,
+        column: place.column,
+        message,
+        unreadable: false,
+    }
 }
 
 /// A file, row by row.
 struct Rows<'a> {
     path: &'a Path,
+    /// The first row.
+    header: &'a str,
     lines: std::iter::Enumerate<std::str::Lines<'a>>,
     errors: Vec<Diagnostic>,
 }
@@ -107,18 +131,15 @@ impl<'a> Rows<'a> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         Self {
             path,
+            header: "",
             lines: text.lines().enumerate(),
             errors: Vec::new(),
         }
     }
 
     fn wrong(&mut self, line: usize, column: usize, message: String) {
-        self.errors.push(Diagnostic {
-            path: self.path.to_owned(),
-            line,
-            column,
-            message,
-        });
+        let place = Place { line, column };
+        self.errors.push(about(self.path, place, message));
     }
 
     /// Where the columns `wanted`, all of them, stand.
@@ -132,21 +153,21 @@ impl<'a> Rows<'a> {
             self.wrong(0, 0, format!("is empty; {rule}"));
             return Err(Wrong::Content(std::mem::take(&mut self.errors)));
         };
-        let row = Row { line: header };
+        let row = Row {
+            header,
+            line: header,
+        };
+        self.header = header;
         let names: Vec<&str> = header.split(',').map(str::trim).collect();
         for (k, name) in names.iter().enumerate() {
-            let problem = if !wanted().any(|w| w == *name) {
-                "unknown"
+            let message = if !wanted().any(|w| w == *name) {
+                let meant = suggestion(name, wanted());
+                format!("unknown column {}; {rule}{meant}", quoted(name))
             } else if names[..k].contains(name) {
-                "second"
+                format!("a second column {}; {rule}, each once", quoted(name))
             } else {
                 continue;
             };
-            let message = format!(
-                "{problem} column {}; {rule}{}",
-                quoted(name),
-                suggestion(name, wanted())
-            );
             self.wrong(1, row.place(k), message);
         }
         let mut columns = Vec::new();
@@ -174,7 +195,8 @@ impl<'a> Rows<'a> {
                 continue;
             }
             let fields = line.split(',').count();
-            let row = Row { line };
+            let header = self.header;
+            let row = Row { header, line };
             if fields != count {
                 self.wrong(
                     i + 1,
@@ -198,6 +220,7 @@ impl<'a> Rows<'a> {
 
 #[derive(Clone, Copy)]
 struct Row<'a> {
+    header: &'a str,
     line: &'a str,
 }
 
@@ -224,7 +247,7 @@ impl<'a> Row<'a> {
 
     fn number<T: FromNumber>(self, k: usize) -> Result<T, (usize, String)> {
         let value = self.float(k).and_then(T::from_number);
-        value.ok_or_else(|| (k, self.message::<T>(k)))
+        value.ok_or_else(|| (k, self.message(k, &T::rule())))
     }
 
     fn vector<T: FromVector>(self, columns: [usize; 3]) -> Result<T, (usize, String)> {
@@ -234,27 +257,42 @@ impl<'a> Row<'a> {
         {
             return Ok(value);
         }
-        // The first that is wrong by itself, else the first.
-        let wrong = columns.iter().copied().find(|&k| {
-            self.float(k)
-                .is_none_or(|x| T::from_vector(DVec3::new(x, x, x)).is_none())
-        });
-        let k = wrong.unwrap_or(columns[0]);
-        Err((k, self.message::<T>(k)))
+        // Beside numbers that are right for any kind of vector, so that a 0 in a direction is none.
+        let alone = |x: f64| T::from_vector(DVec3::new(x, 1.0, 1.0)).is_some();
+        let wrong = columns
+            .iter()
+            .copied()
+            .find(|&k| !self.float(k).is_some_and(alone));
+        match wrong {
+            Some(k) => Err((k, self.message(k, &T::rule_of_one()))),
+            None => {
+                let names = columns.map(|k| self.name(k)).join(", ");
+                let values = columns.map(|k| self.field(k)).join(", ");
+                let rule = T::rule();
+                Err((
+                    columns[0],
+                    format!("{names} are {values}; they must be {rule}"),
+                ))
+            }
+        }
     }
 
-    fn message<T: Value>(self, k: usize) -> String {
-        format!(
-            "{} is not what is wanted here: {}",
-            quoted(self.field(k)),
-            T::rule()
-        )
+    /// What the first row calls field `k`.
+    fn name(self, k: usize) -> &'a str {
+        self.header.split(',').nth(k).unwrap_or_default().trim()
+    }
+
+    fn message(self, k: usize, rule: &str) -> String {
+        let (name, found) = (self.name(k), quoted(self.field(k)));
+        format!("{name} is {found}; {name} must be {rule}")
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const PLACE: Place = Place { line: 3, column: 1 };
 
     fn faults(text: &str) -> Vec<String> {
         let named = |name: &str| {
@@ -264,9 +302,9 @@ mod tests {
                 Err(format!("no {name}"))
             }
         };
-        match spheres("x.csv".as_ref(), text, 3, None, named) {
+        match spheres("x.csv".as_ref(), text, PLACE, None, named) {
             Ok(_) => Vec::new(),
-            Err(Wrong::File(message)) => vec![message],
+            Err(Wrong::Unreadable(message)) => vec![message],
             Err(Wrong::Content(all)) => all
                 .iter()
                 .map(|d| format!("{}:{}: {}", d.line, d.column, d.message))
@@ -277,7 +315,7 @@ mod tests {
     #[test]
     fn columns_may_stand_in_any_order() {
         let text = "radius, z,y,x ,material\n 2,3,4,5, red \n\n1e-3,0,-1,+2.5,red\r\n";
-        let all = spheres("x.csv".as_ref(), text, 3, None, |_| Ok(7))
+        let all = spheres("x.csv".as_ref(), text, PLACE, None, |_| Ok(7))
             .ok()
             .expect("spheres");
         let center = DVec3::new(5.0, 4.0, 3.0);
@@ -290,7 +328,7 @@ mod tests {
         );
         assert_eq!((all.len(), all[1].material, all[1].line), (2, 7, 3));
         let text = "x,y,z,nx,ny,nz,radius,r,g,b\n1,2,3,0,-2,0,0.5,9,8,7\n";
-        let all = lights("x.csv".as_ref(), text, 3).ok().expect("lights");
+        let all = lights("x.csv".as_ref(), text, PLACE).ok().expect("lights");
         assert_eq!(
             (all[0].normal, all[0].radiance),
             (DVec3::NEG_Y, DVec3::new(9.0, 8.0, 7.0))
@@ -302,8 +340,8 @@ mod tests {
         assert_eq!(
             faults("x,y,z,radius,material\n1,2,3,1,red\n1,two,3,1,red\n1,2,3,-1,blue\n"),
             [
-                "3:3: \"two\" is not what is wanted here: three numbers from -1e15 to 1e15 (limits of f32 kernels)",
-                "4:7: \"-1\" is not what is wanted here: a number from 1e-15 to 1e15 (limits of f32 kernels)"
+                "3:3: y is \"two\"; y must be a number from -1e15 to 1e15 (limits of f32 kernels)",
+                "4:7: radius is \"-1\"; radius must be a number from 1e-15 to 1e15 (limits of f32 kernels)"
             ]
         );
         assert_eq!(
@@ -320,7 +358,36 @@ mod tests {
                 format!("1:0: no column radius; {rule}")
             ]
         );
+        assert_eq!(
+            faults("x,y,z,radius,material,radius\n"),
+            [format!(
+                "1:23: a second column \"radius\"; {rule}, each once"
+            )]
+        );
         assert_eq!(faults(""), [format!("0:0: is empty; {rule}")]);
         assert_eq!(faults("x,y,z,radius,material\n0,0,0,nan,red\n").len(), 1);
+        let dark = "x,y,z,nx,ny,nz,radius,r,g,b\n1,2,3,0,0,0,0.5,9,8,7\n1,2,3,0,inf,1,1,1,1,1\n";
+        let Err(Wrong::Content(all)) = lights("x.csv".as_ref(), dark, PLACE) else {
+            panic!("no direction");
+        };
+        let all: Vec<_> = all.iter().map(|d| d.message.as_str()).collect();
+        assert_eq!(
+            all,
+            [
+                "nx, ny, nz are 0, 0, 0; they must be three finite numbers, not all 0",
+                "ny is \"inf\"; ny must be a finite number"
+            ]
+        );
+    }
+
+    #[test]
+    fn what_is_no_text_has_its_place() {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        std::fs::write(file.path(), b"x,y,z,radius,material\n0,0,\xe9,1,red\n").expect("written");
+        let Err(Wrong::Content(all)) = read(file.path()) else {
+            panic!("no text");
+        };
+        assert_eq!((all[0].line, all[0].column), (2, 5));
+        assert!(all[0].message.starts_with("byte 0xe9 is not UTF-8"));
     }
 }

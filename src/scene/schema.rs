@@ -1,5 +1,6 @@
 //! JSON Schema of scene files, for editors: completion, hover texts, and most errors while typing.
 
+use super::Place;
 use super::format::{self, Found, MaterialKind, Need, ShapeKind, Table};
 use super::value::{Text, Value};
 use serde_json::{Map, Value as Json, json};
@@ -40,7 +41,7 @@ pub fn schema() -> Json {
     let table = describe(about, format::lights);
     properties.insert("lights".into(), json!({"type": "array", "items": table}));
     let about = "A disk luminaire; reflects nothing.";
-    let light = describe(about, |t| format::light(t, 0));
+    let light = describe(about, |t| format::light(t, Place::default()));
     properties.insert(
         "light".into(),
         json!({"type": "array", "items": light, "minItems": 1}),

@@ -1,8 +1,8 @@
 //! Places in the text of a scene file: from byte offsets to line and column, and to short quotes.
 
-use super::Diagnostic;
+use super::{Diagnostic, Place};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The most errors reported for one file; the rest are counted.
 const MAX_ERRORS: usize = 50;
@@ -50,24 +50,40 @@ impl<'a> Source<'a> {
         self.text
     }
 
-    /// Line, from 1, of a byte offset.
-    pub(super) fn line(&self, offset: usize) -> usize {
-        self.lines.partition_point(|&start| start <= offset)
+    /// The place of a byte offset.
+    pub(super) fn place(&self, offset: usize) -> Place {
+        let line = self.lines.partition_point(|&start| start <= offset);
+        let start = self.lines[line - 1];
+        let before = self.text.get(start..offset.min(self.text.len()));
+        let column = 1 + before.map_or(0, |s| s.chars().count());
+        Place { line, column }
+    }
+
+    /// The same for one of many, without the column where counting up to it would take long: a file may be one line.
+    pub(super) fn table_place(&self, offset: usize) -> Place {
+        /// Bytes of a line, at most.
+        const COUNTED: usize = 1 << 12;
+        let line = self.lines.partition_point(|&start| start <= offset);
+        if offset - self.lines[line - 1] > COUNTED {
+            return Place { line, column: 0 };
+        }
+        self.place(offset)
+    }
+
+    /// The path of a file that the text names: beside its own file, or where `name` leads from there.
+    pub(super) fn beside(&self, name: &str) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(name)
     }
 
     /// A message about the character at `offset`, or about the file.
     pub(super) fn diagnostic(&self, offset: Option<usize>, message: String) -> Diagnostic {
-        let (line, column) = offset.map_or((0, 0), |offset| {
-            let line = self.line(offset);
-            let start = self.lines[line - 1];
-            let before = self.text.get(start..offset.min(self.text.len()));
-            (line, 1 + before.map_or(0, |s| s.chars().count()))
-        });
+        let place = offset.map_or(Place::default(), |offset| self.place(offset));
         Diagnostic {
             path: self.path.to_owned(),
-            line,
-            column,
+            line: place.line,
+            column: place.column,
             message,
+            unreadable: false,
         }
     }
 
@@ -105,8 +121,8 @@ pub(super) fn quoted(name: &str) -> String {
 
 /// The errors of one file.
 pub(super) struct Faults {
-    /// Byte offset, none for the whole file, and message.
-    found: Vec<(Option<usize>, String)>,
+    /// Byte offset, none for the whole file, message, and [`Diagnostic::unreadable`].
+    found: Vec<(Option<usize>, String, bool)>,
     uncounted: usize,
     /// Those in files that the scene names.
     elsewhere: Vec<Diagnostic>,
@@ -131,8 +147,17 @@ impl Faults {
     }
 
     pub(super) fn push(&mut self, offset: Option<usize>, message: String) {
+        self.push_one(offset, message, false);
+    }
+
+    /// What is named at `offset` can't be read.
+    pub(super) fn push_unreadable(&mut self, offset: Option<usize>, message: String) {
+        self.push_one(offset, message, true);
+    }
+
+    fn push_one(&mut self, offset: Option<usize>, message: String, unreadable: bool) {
         if self.found.len() < MAX_ERRORS {
-            self.found.push((offset, message));
+            self.found.push((offset, message, unreadable));
         } else {
             self.uncounted += 1;
         }
@@ -145,7 +170,10 @@ impl Faults {
         let mut diagnostics: Vec<Diagnostic> = self
             .found
             .into_iter()
-            .map(|(offset, message)| source.diagnostic(offset, message))
+            .map(|(offset, message, unreadable)| Diagnostic {
+                unreadable,
+                ..source.diagnostic(offset, message)
+            })
             .collect();
         diagnostics.extend(self.elsewhere);
         if self.uncounted > 0 {
@@ -164,12 +192,14 @@ pub(super) fn suggestion<'c>(word: &str, candidates: impl IntoIterator<Item = &'
         return String::new();
     }
     let word = word.to_lowercase();
+    // Of the letters that were written: two that are missing after three are no slip.
+    let letters = word.chars().count() as f64;
     candidates
         .into_iter()
         .filter(|c| c.len() <= 100)
         .map(|c| {
-            let alike = strsim::normalized_damerau_levenshtein(&word, &c.to_lowercase());
-            (alike, c)
+            let slips = strsim::damerau_levenshtein(&word, &c.to_lowercase());
+            (1.0 - slips as f64 / letters, c)
         })
         .filter(|(alike, _)| *alike >= ALIKE)
         .max_by(|a, b| a.0.total_cmp(&b.0))
@@ -207,6 +237,9 @@ mod tests {
         assert_eq!(suggestion("radios", keys), "; did you mean \"radius\"?");
         assert_eq!(suggestion("radiance", keys), "");
         assert_eq!(suggestion("ior", keys), "");
+        assert_eq!(suggestion("foo", ["floor"]), "");
+        assert_eq!(suggestion("discs", ["disk"]), "; did you mean \"disk\"?");
+        assert_eq!(suggestion("", keys), "");
         assert_eq!(suggestion(&"radius".repeat(50), keys), "");
     }
 }

@@ -48,6 +48,8 @@ pub(super) trait FromNumber: Value {
 /// A kind of value that is three numbers; none if they break the rule.
 pub(super) trait FromVector: Value {
     fn from_vector(v: DVec3) -> Option<Self>;
+    /// What is allowed for each alone, to follow "must be".
+    fn rule_of_one() -> String;
 }
 
 /// Numbers from `low` to `high`; both ends belong to it unless `open`.
@@ -244,6 +246,9 @@ macro_rules! numbers {
             fn from_vector(v: DVec3) -> Option<Self> {
                 v.to_array().iter().all(|x| $interval.holds(*x)).then_some(Self(v))
             }
+            fn rule_of_one() -> String {
+                format!("a number {}", $interval.rule())
+            }
         }
     )*};
 }
@@ -297,6 +302,10 @@ impl FromVector for Direction {
     fn from_vector(v: DVec3) -> Option<Self> {
         let finite = v.to_array().iter().all(|x| FINITE.holds(*x));
         normalized(v).filter(|_| finite).map(Self)
+    }
+
+    fn rule_of_one() -> String {
+        "a finite number".into()
     }
 }
 

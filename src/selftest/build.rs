@@ -1,6 +1,6 @@
 //! Scenes made in memory, for the cases and for tests.
 
-use crate::scene::{Bsdf, Camera, Light, Material, Primitive, RenderHints, Scene, Shape};
+use crate::scene::{Bsdf, Camera, Light, Material, Place, Primitive, RenderHints, Scene, Shape};
 use crate::settings::{Overrides, Settings};
 use glam::DVec3;
 
@@ -70,6 +70,7 @@ impl Build {
         };
         Self(Scene {
             path: Default::default(),
+            row_files: Vec::new(),
             title: None,
             camera: Camera {
                 eye,
@@ -97,10 +98,12 @@ impl Build {
             shape,
             material: self.0.materials.len(),
             line: 0,
+            column: 0,
         });
         self.0.materials.push(Material {
             name: String::new(),
             bsdf,
+            place: Place::default(),
         });
         self
     }
@@ -118,6 +121,7 @@ impl Build {
             radius,
             radiance: DVec3::splat(radiance),
             line: 0,
+            column: 0,
         });
         self
     }

@@ -35,7 +35,7 @@ fn bench_refuses_what_it_cannot_do() {
             "box.toml --engine tpu",
             "gpu-baked, gpu-buffers, gpu-tree, cpu, cpu-brute",
         ),
-        ("box.toml --seeds 0", "0 is not in"),
+        ("box.toml --seeds 0", "a whole number from 1 to 1024"),
         ("box.toml --time soon", "90s, 2m, 1h30m"),
         ("box.toml --plot a.pdf", ".svg or .png"),
         ("box.toml --engine cpu --adapter x", "--adapter"),
@@ -178,8 +178,8 @@ fn json_lines_carry_what_was_measured() {
         assert_eq!(p["seeds"], 2);
         assert!(p["seconds"]["render"]["mean"].as_f64().unwrap() > 0.0);
         assert!(p["mse"]["sd"].as_f64().unwrap() >= 0.0);
-        // Two of four replicates have samples only from the fifth sample on.
-        let claims = p["samples"].as_u64().unwrap() > 4;
+        // One sample says nothing of its error.
+        let claims = p["samples"].as_u64().unwrap() > 1;
         assert_eq!(p["claimed_relative_error"].is_null(), !claims, "{p}");
     }
     let paths = |p: &Value| p["paths"].as_u64().unwrap();

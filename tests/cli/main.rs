@@ -7,6 +7,7 @@ mod program;
 
 mod bench;
 mod bits;
+mod files;
 mod said;
 mod selftest;
 mod status;

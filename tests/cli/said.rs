@@ -24,6 +24,44 @@ fn help_and_version_are_data() {
         .stderr("");
 }
 
+/// Text that is wrapped by hand is wrapped again where the terminal is narrower, into long and short lines by turns.
+#[test]
+fn every_command_has_examples_and_even_lines() {
+    let bench = Bench::new();
+    for command in
+        "render check develop merge selftest compare regress make-scene bench adapters schema"
+            .split(' ')
+    {
+        let done = bench.run(&format!("{command} --help")).success();
+        let help = String::from_utf8_lossy(&done.get_output().stdout).into_owned();
+        assert!(help.contains("Example"), "{command}: {help}");
+        let prose: Vec<&str> = help
+            .lines()
+            .filter(|l| l.starts_with(char::is_alphanumeric))
+            .collect();
+        for pair in prose.windows(2) {
+            // A line that goes on in the next one is full.
+            let [line, next] = [pair[0], pair[1]];
+            let word = next.split(' ').next().unwrap_or_default();
+            let goes_on =
+                next.starts_with(char::is_lowercase) && help.contains(&format!("{line}\n{next}"));
+            assert!(
+                !goes_on || line.chars().count() + 1 + word.chars().count() > 90,
+                "{command}: {line}"
+            );
+        }
+    }
+    for command in [
+        "render", "selftest", "bench", "regress", "compare", "merge", "develop",
+    ] {
+        bench.run(&format!("{command} --help")).success().stdout(
+            says("--quiet")
+                .and(says("--progress"))
+                .and(says("--threads")),
+        );
+    }
+}
+
 #[test]
 fn the_report_on_stdout_has_every_key() {
     let bench = Bench::new();
@@ -92,6 +130,42 @@ fn the_kernel_can_be_seen_without_an_adapter() {
     bench.render("--spp 1 --dump-wgsl kernel.wgsl -o a.png");
     let wgsl = fs::read_to_string(bench.path("kernel.wgsl")).unwrap();
     assert!(wgsl.contains("@compute"));
+}
+
+/// The error is stated from two samples on, however few replicates there are, and alike in report and header.
+#[test]
+fn every_picture_of_two_samples_states_its_error() {
+    let bench = Bench::new();
+    for (spp, strata, known) in [
+        (1, 2, false),
+        (2, 2, true),
+        (4, 2, true),
+        (5, 2, true),
+        (2, 1, true),
+    ] {
+        bench.render(&format!(
+            "--spp {spp} --strata {strata} -o a.exr --report r.json"
+        ));
+        let report = fs::read_to_string(bench.path("r.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        let header = bench.picture("a.exr").attributes;
+        let error = header
+            .get("relative_error")
+            .map(|e| e.parse::<f64>().unwrap());
+        assert_eq!(report["relative_error"].as_f64(), error);
+        assert_eq!(error.is_some_and(|e| e > 0.0), known, "{spp} samples");
+    }
+}
+
+/// Of pixels with different samples, header and report say the mean.
+#[test]
+fn samples_are_means() {
+    let bench = Bench::new();
+    bench.render("--spp 3 --region 0,0,24,4 --film f.npz -o a.png");
+    bench.render("--spp 5 --region 0,0,12,4 --film f.npz -o a.exr --report r.json");
+    let report = fs::read_to_string(bench.path("r.json")).unwrap();
+    assert!(report.contains("\"spp\": 4,"), "{report}");
+    assert_eq!(bench.picture("a.exr").attributes["samples"], "4");
 }
 
 #[test]

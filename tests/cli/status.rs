@@ -35,10 +35,11 @@ fn status_2_for_a_bad_command_line() {
         ("--region 1,1,1,2", "half-open"),
         ("--region 0,0,25,16", "24x16"),
         ("--light direct,dim", "\"dim\""),
-        ("--max-depth 0", "0 is not in"),
-        ("--strata 0", "0 is not in"),
-        ("--shadow-rays 0", "0 is not in"),
-        ("--seed -1", "-1"),
+        ("--max-depth 0", "a whole number from 1 to 4294967295"),
+        ("--strata 0", "a whole number from 1 to 1024"),
+        ("--shadow-rays 0", "a whole number from 1 to 1024"),
+        ("--seed abc", "a whole number from 0 to 4294967295"),
+        ("--adapter=", "part of an adapter's name"),
         ("--integrator radiosity", "whitted"),
         ("--adapter x", "--backend cpu"),
         ("--checkpoint 5s", "--film"),
@@ -97,12 +98,100 @@ fn status_3_without_the_adapter_asked_for() {
 }
 
 #[test]
-fn status_3_for_a_picture_larger_than_memory() {
+fn status_2_for_a_picture_larger_than_memory() {
     let bench = Bench::new();
-    bench
-        .run("render box.toml --backend cpu --size 65536x65536 --spp 1")
-        .code(3)
-        .stderr(says("4295.0 million pixels").and(says("GB")));
+    for backend in ["cpu", "auto"] {
+        bench
+            .run(&format!(
+                "render box.toml --backend {backend} --size 65536x65536 --spp 1"
+            ))
+            .code(2)
+            .stderr(says("4295.0 million pixels").and(says("GB")));
+    }
+}
+
+/// What begins with a hyphen is told the rule, not that there is no such flag.
+#[test]
+fn negative_values_are_told_the_rule() {
+    let bench = Bench::new();
+    for (command, flag, value, rule) in [
+        (
+            "render box.toml",
+            "--seed",
+            "-1",
+            "a whole number from 0 to 4294967295",
+        ),
+        ("render box.toml", "--size", "-1x5", "1 to 65536"),
+        ("render box.toml", "--time", "-1s", "90s, 2m, 1h30m"),
+        ("render box.toml", "--region", "-1,0,4,4", "whole pixels"),
+        ("render box.toml", "--exposure", "-inf", "from -100 to 100"),
+        ("render box.toml", "--exposure", "-101", "from -100 to 100"),
+        ("render box.toml", "--spp", "-1", "a whole number, 1 to"),
+        ("render box.toml", "--error", "-1%", "more than 0"),
+        (
+            "render box.toml",
+            "--samples",
+            "-1..4",
+            "not a whole number from 0",
+        ),
+        (
+            "render box.toml",
+            "--max-depth",
+            "-1",
+            "a whole number from 1",
+        ),
+        (
+            "render box.toml",
+            "--shadow-rays",
+            "-2",
+            "a whole number from 1 to 1024",
+        ),
+        (
+            "render box.toml",
+            "--threads",
+            "-1",
+            "a whole number from 1 to 4096",
+        ),
+        (
+            "make-scene spheres",
+            "--count",
+            "-1",
+            "a whole number from 1 to 5000000",
+        ),
+        (
+            "make-scene spheres",
+            "--seed",
+            "-1",
+            "a whole number from 0",
+        ),
+        ("compare a b", "--alpha", "-1", "a probability"),
+        ("compare a b", "--max-flip", "-0.1", "from 0 to 1"),
+        ("compare a b", "--max-flip", "2", "from 0 to 1"),
+        ("regress a", "--jobs", "-1", "a whole number from 1 to 256"),
+        (
+            "regress a --bless",
+            "--power",
+            "-1%",
+            "more than 0 and at most 1",
+        ),
+        ("regress a --bless", "--power", "0", "expected a change"),
+        (
+            "bench box.toml",
+            "--seeds",
+            "-1",
+            "a whole number from 1 to 1024",
+        ),
+        ("bench box.toml", "--max-spp", "-1", "a whole number, 1 to"),
+    ] {
+        let text = format!("error: invalid value '{value}' for '{flag} <");
+        bench
+            .run(&format!("{command} {flag} {value}"))
+            .code(2)
+            .stdout("")
+            .stderr(says(&text).and(says(rule)).and(says("tip:").not()));
+    }
+    // The value's own sign is no matter where it may have one.
+    bench.render("--spp 1 --exposure -2 -o a.png");
 }
 
 #[test]
@@ -135,6 +224,14 @@ fn status_4_for_files_that_cannot_be_had() {
             "render box.toml --backend cpu --spp 1 --dump-wgsl folder",
             "folder",
         ),
+        (
+            "compare folder box.exr",
+            "folder: cannot read: is a directory",
+        ),
+        (
+            "compare none.exr box.exr",
+            "none.exr: cannot read: no such file",
+        ),
     ] {
         bench
             .run(args)
@@ -142,6 +239,36 @@ fn status_4_for_files_that_cannot_be_had() {
             .stderr(says("error: ").and(says(name)));
     }
     assert_eq!(bench.names(), ["box.toml", "folder"]);
+}
+
+/// The scene is all right, but for files that it names.
+#[test]
+fn status_4_for_files_of_rows_that_cannot_be_had() {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("folder")).unwrap();
+    let with = |file: &str| {
+        let text = format!("{SCENE}\n[[spheres]]\nfile = \"{file}\"\nmaterial = \"white\"\n");
+        fs::write(bench.path("rows.toml"), text).unwrap();
+    };
+    let line = SCENE.lines().count() + 3;
+    for (file, why) in [
+        ("none.csv", "no such file or directory"),
+        ("folder", "is a directory"),
+    ] {
+        with(file);
+        for command in ["check", "render --backend cpu"] {
+            bench
+                .run(&format!("{command} rows.toml"))
+                .code(4)
+                .stderr(format!(
+                    "error: rows.toml:{line}:8: cannot read {file}: {why}\n"
+                ));
+        }
+    }
+    // With anything else wrong it is the content.
+    fs::write(bench.path("bad.csv"), "x,y,z\n").unwrap();
+    with("bad.csv");
+    bench.run("check rows.toml").code(2);
 }
 
 /// Sends `signal` to a render that would take for ever, once its film is there; its exit status.
@@ -174,8 +301,11 @@ pub fn interrupted(bench: &Bench, signal: &str) -> Option<i32> {
 
 #[cfg(unix)]
 #[test]
-fn status_130_and_143_after_saving_what_there_is() {
-    for (signal, status) in [("-INT", 130), ("-TERM", 143)] {
+fn status_130_143_and_129_after_saving_what_there_is() {
+    let mut signals = vec![("-INT", 130), ("-TERM", 143)];
+    // Where the system tells whether hanging up is to be ignored.
+    signals.extend(cfg!(target_os = "linux").then_some(("-HUP", 129)));
+    for (signal, status) in signals {
         let bench = Bench::new();
         assert_eq!(interrupted(&bench, signal), Some(status));
         let held = bench.film("f.npz").coverage.samples();

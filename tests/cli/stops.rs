@@ -27,6 +27,58 @@ fn time_and_error_end_a_run() {
         .stdout(says("\"stop_reason\": \"spp\""));
 }
 
+/// An error that no run reaches leaves the other conditions as they are.
+#[test]
+fn time_holds_whatever_the_error() {
+    let bench = Bench::new();
+    for error in ["1e-8", "1e-20", "1e-100", "1e-320"] {
+        bench
+            .run(&format!(
+                "render box.toml --backend cpu --error {error} --time 300ms -o a.exr --report -"
+            ))
+            .success()
+            .stdout(says("\"stop_reason\": \"time\""));
+    }
+}
+
+/// What `nohup` starts outlives its terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn hanging_up_stays_ignored() {
+    use std::process::Command;
+    use std::thread::sleep;
+    use std::time::{Duration, Instant};
+    let bench = Bench::new();
+    let mut child = Command::new("sh")
+        .args([
+            "-c",
+            "trap '' HUP; exec \"$0\" \"$@\"",
+            env!("CARGO_BIN_EXE_etendue"),
+        ])
+        .args("render box.toml --backend cpu --quiet --spp 4000000 --checkpoint 100ms".split(' '))
+        .args(["--film", "f.npz", "-o", "a.png"])
+        .current_dir(bench.dir.path())
+        .spawn()
+        .expect("it starts");
+    let begun = Instant::now();
+    while !bench.path("f.npz").exists() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "no checkpoint");
+        sleep(Duration::from_millis(20));
+    }
+    let send = |signal: &str| {
+        let sent = Command::new("kill")
+            .args([signal, &child.id().to_string()])
+            .status();
+        assert!(sent.expect("kill").success());
+    };
+    send("-HUP");
+    sleep(Duration::from_millis(500));
+    // It takes the next signal for the first.
+    send("-TERM");
+    assert_eq!(child.wait().expect("its end").code(), Some(143));
+    assert!(bench.path("a.png").exists(), "nothing was saved");
+}
+
 /// The first signal's work can last: here on a report to a pipe that nobody reads. A second signal ends it.
 #[cfg(unix)]
 #[test]

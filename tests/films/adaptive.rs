@@ -14,7 +14,13 @@ fn a_film_is_gone_on_with_bit_for_bit_and_its_counts_differ() {
         .success()
         .stderr(says("90.0 samples a pixel on average"));
     let report = std::fs::read_to_string(bench.path("r.json")).expect("a report");
-    assert!(report.contains("\"spp\": 90,"), "{report}");
+    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    let spp = report["spp"].as_f64().expect("a number");
+    assert!((spp - 90.0).abs() < 0.5, "{spp}");
+    // The header says the same.
+    let header = bench.picture("a.exr").attributes["samples"].parse();
+    assert_eq!(header, Ok(spp));
+    assert_eq!(spp, bench.film("once.npz").coverage.mean());
     for spp in [20, 45, 64, 71, 90] {
         bench
             .run(&format!("{RENDER} --spp {spp} --film f.npz"))

@@ -36,13 +36,16 @@ fn damaged_films_are_refused_and_left_as_they_are() {
     let cases = [
         (edited(&|b| b.truncate(b.len() / 2)), "truncated"),
         (edited(&|b| b.truncate(b.len() - 1)), "truncated"),
-        (Vec::new(), "truncated"),
+        (Vec::new(), "not a film: it is empty"),
         (edited(&|b| b.push(0)), "bytes after its end"),
         (edited(&|b| b[20_000] ^= 4), "does not match its checksum"),
-        (png, "no usable film"),
-        (scene, "no usable film"),
+        (png, "not a film: it is a PNG picture"),
+        (scene, "not a film: it is no NumPy archive"),
         (with_a_nan(&bench), "\"sums\" holds NaN"),
-        (edited(&|b| negate_first_count(b, 4)), "counts -1 samples"),
+        (
+            edited(&|b| negate_first_count(b, 4)),
+            "counts 18446744073709551615 samples",
+        ),
         (
             edited(&|b| forge(b, "\"format_version\":1", "\"format_version\":2")),
             "its format version is 2; this program reads version 1",

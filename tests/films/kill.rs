@@ -96,7 +96,7 @@ fn killed_at_random(backend: &str, kills: usize, most: Duration, after_a_save: b
         let (film, provenance) = store::load(&path).expect("a whole film");
         let samples = film.coverage.samples().0;
         assert!(samples >= held, "{samples} samples after {held}");
-        assert_eq!(provenance.samples, samples);
+        assert_eq!(provenance.samples, samples as f64);
         held = samples;
         if written(&path) > started {
             lost.push(killed.duration_since(written(&path)).unwrap_or_default());

@@ -48,7 +48,7 @@ pub fn provenance(size: [u32; 2]) -> Provenance {
             light: LightParts::ALL,
             integrator: Integrator::Path,
         },
-        samples: 0,
+        samples: 0.0,
         replicates: 0,
         devices: Vec::new(),
         seconds: 0.0,

@@ -8,6 +8,7 @@ use etendue::output::{Picture, read_exr};
 use predicates::prelude::*;
 use std::fs;
 use std::path::PathBuf;
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// A box with a mirror, a glass ball and a light: every flag has something to act on.
@@ -81,6 +82,8 @@ impl Bench {
         let mut command = Command::new(env!("CARGO_BIN_EXE_etendue"));
         command.current_dir(self.dir.path());
         command.args(args.split_whitespace());
+        // What hangs is to fail.
+        command.timeout(Duration::from_secs(300));
         command.assert()
     }
 

@@ -1,6 +1,6 @@
 //! Random scenes of every size that the format allows.
 
-use etendue::scene::{Bsdf, Camera, Light, Material, Primitive, RenderHints, Scene, Shape};
+use etendue::scene::{Bsdf, Camera, Light, Material, Place, Primitive, RenderHints, Scene, Shape};
 use glam::DVec3;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -72,6 +72,7 @@ fn light() -> impl Strategy<Value = Light> {
             radius,
             radiance: color * power,
             line: 0,
+            column: 0,
         },
     )
 }
@@ -104,7 +105,11 @@ pub fn scenes() -> impl Strategy<Value = Scene> {
                 materials.into_iter().collect();
             let materials: Vec<Material> = materials
                 .into_iter()
-                .map(|(name, bsdf)| Material { name, bsdf })
+                .map(|(name, bsdf)| Material {
+                    name,
+                    bsdf,
+                    place: Place::default(),
+                })
                 .collect();
             let primitives = primitives.into_iter().filter_map(|(shape, index)| {
                 let material = index.index(materials.len());
@@ -114,6 +119,7 @@ pub fn scenes() -> impl Strategy<Value = Scene> {
                     shape,
                     material,
                     line: 0,
+                    column: 0,
                 })
             });
             let mut primitives: Vec<Primitive> = primitives.collect();
@@ -125,6 +131,7 @@ pub fn scenes() -> impl Strategy<Value = Scene> {
                     },
                     material: 0,
                     line: 0,
+                    column: 0,
                 });
             }
             primitives.sort_by_key(|p| {
@@ -134,6 +141,7 @@ pub fn scenes() -> impl Strategy<Value = Scene> {
             });
             Scene {
                 path: "random.toml".into(),
+                row_files: Vec::new(),
                 title,
                 camera,
                 render: RenderHints {

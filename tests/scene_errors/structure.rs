@@ -38,6 +38,19 @@ fn unknown_keys_and_names_get_suggestions() {
         "63:12: unknown material \"glas\"; defined here: glass, gloss, steel, white; \
          did you mean \"glass\"?",
     );
+    // A name that would not be seen.
+    let unnamed = FULL.replace("[material.gloss]", "[material.\"\"]");
+    assert_eq!(
+        parse(&unnamed).expect_err("no gloss"),
+        [
+            "s.toml:47:12: unknown material \"gloss\"; defined here: \"\", glass, steel, white; did you mean \"glass\"?"
+        ]
+    );
+    one(
+        "material = \"glass\"",
+        "material = \"foo\"",
+        "63:12: unknown material \"foo\"; defined here: glass, gloss, steel, white",
+    );
     one(
         "material = \"glass\"",
         "material = \"velvet\"",
@@ -138,7 +151,11 @@ fn duplicates_and_syntax() {
         format!("s.toml:19:11: duplicate \"white\": {once}")
     );
     for (old, new, place) in [
-        ("vfov = 42", "vfov = ", "s.toml:7:8: not TOML: "),
+        (
+            "vfov = 42",
+            "vfov = ",
+            "s.toml:7:8: not TOML: a value is missing",
+        ),
         ("[camera]", "[camera", "s.toml:3:8: not TOML: "),
         ("\"Everything\"", "\"Everything", "s.toml:1:20: not TOML: "),
         (

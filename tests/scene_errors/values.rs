@@ -20,6 +20,18 @@ fn wrong_types() {
             &format!("62:10: radius is {found}; {radius}"),
         );
     }
+    // Tables without text of their own.
+    let vfov = "vfov must be a number above 0 and below 180";
+    one(
+        "vfov = 42",
+        "vfov.x = 42",
+        &format!("7:1: vfov is a table; {vfov}"),
+    );
+    one(
+        "vfov = 42\nresolution = [512, 384]\n",
+        "resolution = [512, 384]\n[[camera.vfov]]\nx = 1\n",
+        &format!("8:1: vfov is an array of tables; {vfov}"),
+    );
     one(
         "\"Everything\"",
         "3",

@@ -11,10 +11,10 @@ use std::time::Duration;
 /// `etendue bench`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every engine makes pictures of 1, 2, 4, ... samples a pixel, each with several seeds and each begun anew; engines take
-turns. All are held against a reference picture, whose own noise is subtracted from squared errors. A spread (±) is the
-standard deviation of a single seed. Efficiency is 1 / (MSE x seconds), reading back included, compiling and warming up
-not; compare it within one run alone. The reference's file depends on the scene and on all it is made with, the kernel
+Every engine makes pictures of 1, 2, 4, ... samples a pixel, each with several seeds and each begun anew; engines take \
+turns. All are held against a reference picture, whose own noise is subtracted from squared errors. A spread (±) is the \
+standard deviation of a single seed. Efficiency is 1 / (MSE x seconds), reading back included, compiling and warming up \
+not; compare it within one run alone. The reference's file depends on the scene and on all it is made with, the kernel \
 too: to compare kernels, give both the same --reference.
 
 Examples:
@@ -24,8 +24,8 @@ Examples:
   etendue bench --report-table --time 10m
   etendue bench --scaling --plot scaling.svg --json scaling.jsonl
 
-Exit status: 0 measured, 2 bad command line or input, 3 no adapter or it failed, 4 a file can't be read or written,
-130 or 143 interrupted, after showing what was measured.")]
+Exit status: 0 measured; 2 bad command line or input; 3 no adapter or it failed; 4 a file can't be read or written; \
+130, 143 or 129 interrupted, after showing what was measured.")]
 pub struct BenchArgs {
     /// Scene files
     #[arg(
@@ -41,13 +41,13 @@ pub struct BenchArgs {
     pub engine: Vec<EngineKind>,
     /// Rendering time of each engine and scene (with --scaling, series), over all its pictures; its pictures of one sample
     /// are made whatever they take [default: 20s, with --report-table 4m]
-    #[arg(long, value_name = "TIME", value_parser = values::duration)]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true)]
     pub time: Option<Duration>,
     /// Pictures of each sample count, each with another seed
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true)]
     pub seeds: u32,
     /// The most samples a pixel, however much time is left
-    #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = values::samples)]
+    #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = values::samples, allow_hyphen_values = true)]
     pub max_spp: u64,
     /// The report's Figure 9 instead: seconds for 1, 32, 128 and 256 rays per pixel-sample of indirect light, direct
     /// light, both with several lights, and three materials
@@ -66,7 +66,7 @@ pub struct BenchArgs {
     #[arg(long, value_name = "FILE", help_heading = "Reference")]
     pub reference: Option<PathBuf>,
     /// Samples a pixel of a reference that is made, by the first engine that is not cpu-brute
-    #[arg(long, value_name = "N", default_value_t = 512, value_parser = values::samples,
+    #[arg(long, value_name = "N", default_value_t = 512, value_parser = values::samples, allow_hyphen_values = true,
           conflicts_with = "reference", help_heading = "Reference")]
     pub reference_spp: u64,
     /// Where references are kept [default: etendue in the user's cache folder]
@@ -81,25 +81,26 @@ pub struct BenchArgs {
     pub plot: Vec<PathBuf>,
 
     /// Width and height in pixels instead of the scene's
-    #[arg(long, value_name = "WxH", value_parser = values::size, help_heading = "What to render")]
+    #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, help_heading = "What to render")]
     pub size: Option<[u32; 2]>,
     /// Which light to keep, by commas: emitted, direct, indirect
-    #[arg(long, value_name = "LIST", value_parser = values::light, conflicts_with = "report_table",
+    #[arg(long, value_name = "LIST", value_parser = values::light, allow_hyphen_values = true, conflicts_with = "report_table",
           help_heading = "What to render")]
     pub light: Option<LightParts>,
     /// Light samples at every vertex, over all lights together [default: chosen from the scene]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024),
+    #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub shadow_rays: Option<u32>,
     /// Cells a side into which a pixel is divided
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024),
+    #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub strata: Option<u32>,
     /// The first of the seeds
-    #[arg(long, value_name = "N", help_heading = "What to render")]
+    #[arg(long, value_name = "N", value_parser = values::seed(), allow_hyphen_values = true,
+          help_heading = "What to render")]
     pub seed: Option<u32>,
     /// The adapter whose name contains NAME, in any case
-    #[arg(long, value_name = "NAME", help_heading = "What with")]
+    #[arg(long, value_name = "NAME", value_parser = values::part_of_name, help_heading = "What with")]
     pub adapter: Option<String>,
 
     /// How much to say.

@@ -6,6 +6,7 @@ mod scaling;
 
 use super::args::Backend;
 use super::failure::Failure;
+use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::signals::Signals;
 use super::{backend, memory, say};
@@ -17,15 +18,13 @@ use crate::bench::{
 use crate::engine::EngineError;
 use crate::gpu::Gpu;
 use crate::kernel::Access;
-use crate::output::atomic;
 use crate::run::Tally;
 use crate::scene::hash::scene_hash;
 use crate::scene::{Scene, parse};
 use crate::settings::Settings;
 use crate::world::World;
 use args::BenchArgs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -34,7 +33,7 @@ const TIME: Duration = Duration::from_secs(20);
 
 /// Measures, and shows what was measured, whatever ended it.
 pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
-    let plots = check_outputs(args)?;
+    let (plots, mut files) = check_files(args)?;
     if args.reference.is_some() && args.scenes.len() > 1 {
         return Err(Failure::Input(format!(
             "--reference is one picture, and there are {} scenes",
@@ -48,6 +47,9 @@ pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let read =
         |path: &PathBuf| parse::parse_str(path, &parse::read_text(path)?).map_err(Failure::Scene);
     let scenes: Vec<Scene> = args.scenes.iter().map(read).collect::<Result<_, _>>()?;
+    for path in scenes.iter().flat_map(|s| &s.row_files) {
+        files.reads("a file of rows of a scene", path)?;
+    }
     let gpu = open(args)?;
     let mut bench = Bench {
         args,
@@ -75,22 +77,28 @@ pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
     }
 }
 
-/// Refuses files that could not be written in the end, and plots of unknown formats.
-fn check_outputs(args: &BenchArgs) -> Result<Vec<(PathBuf, plot::Format)>, Failure> {
+/// Plots with their formats, and all files. Refuses plots of unknown formats, files that could not be written in the end, and
+/// those that would take another's place.
+fn check_files(args: &BenchArgs) -> Result<(Vec<(PathBuf, plot::Format)>, Files), Failure> {
     let mut plots = Vec::new();
     for path in &args.plot {
         let format = plot::Format::from_path(path).map_err(Failure::Input)?;
         plots.push((path.clone(), format));
     }
-    let json = args.json.iter().filter(|p| !is_stdout(p));
-    for path in args.plot.iter().chain(json) {
-        atomic::check_writable(path)?;
+    let mut files = Files::default();
+    for path in &args.scenes {
+        files.reads("a scene", path)?;
     }
-    Ok(plots)
-}
-
-fn is_stdout(path: &Path) -> bool {
-    path == Path::new("-")
+    if let Some(path) = &args.reference {
+        files.reads("the reference", path)?;
+    }
+    for path in &args.plot {
+        files.writes("--plot", path)?;
+    }
+    if let Some(path) = &args.json {
+        files.writes_text("--json", path)?;
+    }
+    Ok((plots, files))
 }
 
 /// The adapter, if an engine that was asked for needs one, or if none was asked for and there is one.
@@ -288,10 +296,8 @@ impl Bench<'_> {
 
     /// Writes what was asked for besides the tables.
     fn write(&self, plots: &[(PathBuf, plot::Format)], panels: &[Panel]) -> Result<(), Failure> {
-        match &self.args.json {
-            Some(path) if is_stdout(path) => super::write_stdout(&self.json)?,
-            Some(path) => atomic::replace(path, |f| f.write_all(self.json.as_bytes()))?,
-            None => {}
+        if let Some(path) = &self.args.json {
+            write_text(path, &self.json)?;
         }
         for (path, format) in plots.iter().filter(|_| !panels.is_empty()) {
             plot::write(path, *format, panels)?;

@@ -2,7 +2,7 @@
 //! defined; but unless it is a thing that rests on another, it is rarely meant.
 
 use super::{COINCIDENT, Warnings, called, is_dielectric};
-use crate::scene::{Scene, Shape};
+use crate::scene::{Place, Scene, Shape};
 use glam::DVec3;
 
 /// In the order in which coincident surfaces are met.
@@ -28,7 +28,7 @@ struct Face {
 /// A primitive or light.
 struct Thing {
     kind: &'static str,
-    line: usize,
+    place: Place,
     /// None for lights.
     shape: Option<Shape>,
     material: Option<usize>,
@@ -45,13 +45,13 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
             if let Some((rank_a, rank_b)) = suspect(a, b) {
                 // `a` is a light, or before `b` among the primitives; the file's order decides
                 // between surfaces of equal rank.
-                let a_first = (rank_a, a.line) <= (rank_b, b.line);
+                let a_first = (rank_a, a.place.line) <= (rank_b, b.place.line);
                 let (first, second) = if a_first { (a, b) } else { (b, a) };
-                warnings.add(second.line, || {
+                warnings.add(second.place, || {
                     format!(
                         "{} coincides with {}, which is met first from either side",
-                        called(second.kind, second.line),
-                        called(first.kind, first.line),
+                        called(second.kind, second.place.line),
+                        called(first.kind, first.place.line),
                     )
                 });
             }
@@ -63,7 +63,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
 fn things(scene: &Scene) -> Vec<Thing> {
     let lights = scene.lights.iter().map(|l| Thing {
         kind: "light",
-        line: l.line,
+        place: l.place(),
         shape: None,
         material: None,
         dielectric: false,
@@ -76,7 +76,7 @@ fn things(scene: &Scene) -> Vec<Thing> {
     });
     let primitives = scene.primitives.iter().map(|p| Thing {
         kind: p.shape.kind(),
-        line: p.line,
+        place: p.place(),
         shape: Some(p.shape),
         material: Some(p.material),
         dielectric: is_dielectric(scene, p),
@@ -237,6 +237,7 @@ fn curved_surfaces_coincide(s: &Shape, t: &Shape, within: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{scene, warned, with};
+    use crate::scene::Place;
 
     const FLOOR: &str = "[[plane]]\npoint = [0,0,0]\nnormal = [0,1,0]\nmaterial = 'white'\n";
 
@@ -273,7 +274,11 @@ mod tests {
             "the plane at line {} coincides with the plane at line {first}, which is met first from either side",
             first + 4
         );
-        assert_eq!(found, [(first + 4, expected)]);
+        let place = Place {
+            line: first + 4,
+            column: 1,
+        };
+        assert_eq!(found, [(place, expected)]);
         assert!(warned(&text, "coincides with"));
     }
 

@@ -14,7 +14,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     for (i, a) in solids.iter().enumerate() {
         for b in &solids[i + 1..] {
             if cross(&a.shape, &b.shape) {
-                warnings.add(b.line, || {
+                warnings.add(b.place(), || {
                     format!(
                         "{} crosses {}; both are dielectric, and what is inside both is undefined: \
                      nest them or keep them apart",

@@ -15,7 +15,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
         |shape: &Shape| signed_distance(shape, eye).abs() <= COINCIDENT * size(shape).min(view);
     let mut warnings = Warnings::default();
     for l in scene.lights.iter().filter(|l| touches(&disk_of(l))) {
-        warnings.add(l.line, || {
+        warnings.add(l.place(), || {
             format!("the eye is on {}", called("light", l.line))
         });
     }
@@ -23,13 +23,13 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
         let name = called(p.shape.kind(), p.line);
         let is_solid = !matches!(p.shape, Shape::Plane { .. });
         if touches(&p.shape) {
-            warnings.add(p.line, || {
+            warnings.add(p.place(), || {
                 format!("the eye is on the surface of {name}: its side is a matter of rounding")
             });
         } else if signed_distance(&p.shape, eye) >= 0.0 {
             continue;
         } else if let Bsdf::Dielectric { ior, .. } = scene.materials[p.material].bsdf {
-            warnings.add(p.line, || {
+            warnings.add(p.place(), || {
                 format!(
                     "the eye is inside {name}: what it sees from outside is {:.4} times as bright \
                  (ior squared)",
@@ -37,7 +37,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
                 )
             });
         } else if is_solid && !holds_light(scene, &p.shape) {
-            warnings.add(p.line, || {
+            warnings.add(p.place(), || {
                 format!(
                     "the eye is inside {name}, which is opaque and holds no light: it sees nothing"
                 )

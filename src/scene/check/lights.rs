@@ -15,7 +15,9 @@ pub(super) fn black(scene: &Scene) -> Warnings {
     let mut warnings = Warnings::default();
     for l in scene.lights.iter().filter(|l| l.radiance == DVec3::ZERO) {
         let light = called("light", l.line);
-        warnings.add(l.line, || format!("{light} has radiance 0: a black disk"));
+        warnings.add(l.place(), || {
+            format!("{light} has radiance 0: a black disk")
+        });
     }
     warnings
 }
@@ -47,7 +49,7 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
         if let Some((_, kind, line)) = covers.iter().find(|c| is_covered(&c.0)) {
             let light = called("light", l.line);
             let cover = called(kind, *line);
-            warnings.add(l.line, || {
+            warnings.add(l.place(), || {
                 format!(
                     "{light} is covered: {cover} is before its front, within {COVER} of its radius"
                 )
@@ -73,7 +75,7 @@ pub(super) fn unseen(scene: &Scene) -> Warnings {
         if let Some((p, how)) = hidden {
             let light = called("light", l.line);
             let wall = called(p.shape.kind(), p.line);
-            warnings.add(l.line, || {
+            warnings.add(l.place(), || {
                 format!("{light} {how} {wall}, which is opaque: no light of it is seen")
             });
         }

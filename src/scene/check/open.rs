@@ -2,7 +2,7 @@
 
 use super::geometry::{directions, disk_of, hit};
 use super::{Warnings, is_dielectric};
-use crate::scene::{Scene, Shape};
+use crate::scene::{Place, Scene, Shape};
 
 /// Rays tried, evenly in all directions.
 const RAYS: usize = 1000;
@@ -26,7 +26,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
         .count();
     let mut warnings = Warnings::default();
     if leaving > 0 {
-        warnings.add(0, || {
+        warnings.add(Place::default(), || {
             format!(
                 "the scene is open: {leaving} of {rays} rays from the eye in all directions leave \
                  it, and carry no light"

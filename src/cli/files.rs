@@ -1,0 +1,262 @@
+//! The files that a command reads and writes: no output may take the place of an input or of another output.
+
+use super::failure::Failure;
+use crate::output::{FileError, atomic};
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Links followed to find where an output leads; the system follows no more either.
+const MAX_LINKS: usize = 40;
+
+/// Endings of what is no film, by which other files of ours are known.
+const NOT_FILMS: [&str; 7] = ["exr", "png", "toml", "csv", "json", "html", "svg"];
+
+/// What a command reads and writes. Every file is checked against those before it, so that a clash is refused before any
+/// work, whatever the order in which they become known.
+#[derive(Default)]
+pub struct Files {
+    known: Vec<Known>,
+}
+
+struct Known {
+    /// What it is, for messages: `the scene`, `--report`.
+    what: String,
+    /// As it was given.
+    path: PathBuf,
+    /// Where that leads.
+    real: PathBuf,
+    written: bool,
+}
+
+impl Files {
+    /// A file that is read: no output may be the same, before or after.
+    pub fn reads(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
+        self.add(what, path, false)
+    }
+
+    /// A file that is to be replaced or made in the end. Refused too if that could not be done now.
+    pub fn writes(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
+        if is_stdout(path) {
+            return Err(Failure::Input(format!(
+                "{what} -: this goes to a file, not to standard output (as --report, --dump-wgsl, --junit and --json can)"
+            )));
+        }
+        self.add(what, path, true)?;
+        Ok(atomic::check_writable(path)?)
+    }
+
+    /// The same for text, which goes to standard output if its name is `-`.
+    pub fn writes_text(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
+        if is_stdout(path) {
+            return self.add(what, path, true);
+        }
+        self.writes(what, path)
+    }
+
+    /// A film that is gone on with, or made if there is none.
+    pub fn writes_film(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
+        self.writes(what, path)?;
+        match fs::metadata(path) {
+            // It would be replaced by another file of this name, which its own permissions could not prevent.
+            Ok(meta) if meta.is_file() => {
+                let protected = meta.permissions().readonly();
+                let refused = fs::OpenOptions::new().write(true).open(path);
+                if protected || refused.is_err() {
+                    let message = "cannot write: the film is write-protected".into();
+                    let path = path.into();
+                    return Err(FileError::Io { path, message }.into());
+                }
+                Ok(())
+            }
+            Ok(_) => Ok(()),
+            Err(_) => check_film_name(what, path),
+        }
+    }
+
+    fn add(&mut self, what: &str, path: &Path, written: bool) -> Result<(), Failure> {
+        // Devices and pipes hold nothing that could be lost.
+        if fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
+            return Ok(());
+        }
+        let new = Known {
+            what: what.into(),
+            path: path.into(),
+            real: if is_stdout(path) && written {
+                path.into()
+            } else {
+                real(path)
+            },
+            written,
+        };
+        let same = |k: &&Known| k.real == new.real && (k.written || written);
+        let clash = self.known.iter().find(same).map(|old| clash(old, &new));
+        self.known.push(new);
+        match clash {
+            Some(message) => Err(Failure::Input(message)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Why two files of one place cannot be, one of which at least is written.
+fn clash(a: &Known, b: &Known) -> String {
+    let named = |k: &Known| format!("{} {}", k.what, k.path.display());
+    match (a.written, b.written) {
+        (true, true) => format!(
+            "{} and {}: one would replace the other; name two files",
+            named(a),
+            named(b)
+        ),
+        (true, false) => lost(a, b),
+        _ => lost(b, a),
+    }
+}
+
+fn lost(output: &Known, input: &Known) -> String {
+    format!(
+        "{} {}: that is {}{}, which would be lost; name another file",
+        output.what,
+        output.path.display(),
+        input.what,
+        if input.path == output.path {
+            String::new()
+        } else {
+            format!(" {}", input.path.display())
+        }
+    )
+}
+
+/// Refuses a new film by a name that says it is something else.
+fn check_film_name(what: &str, path: &Path) -> Result<(), Failure> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    match extension {
+        Some(e) if NOT_FILMS.contains(&e.as_str()) => Err(Failure::Input(format!(
+            "{what} {}: a film is a NumPy archive, and its name ends in .npz, not in .{e}",
+            path.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The one name of a file, there or not: links followed, and its folder's too.
+fn real(path: &Path) -> PathBuf {
+    let mut path = path.to_owned();
+    for _ in 0..MAX_LINKS {
+        if let Ok(real) = fs::canonicalize(&path) {
+            return real;
+        }
+        let folder = match path.parent() {
+            Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
+            _ => ".".into(),
+        };
+        // A link that leads to nothing yet.
+        if let Ok(to) = fs::read_link(&path) {
+            path = folder.join(to);
+            continue;
+        }
+        let folder = fs::canonicalize(&folder).unwrap_or(folder);
+        return folder.join(path.file_name().unwrap_or_default());
+    }
+    path
+}
+
+/// Whether this name stands for standard output.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Writes data to a file, or to standard output if its name is `-`.
+pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    if is_stdout(path) {
+        return super::write_stdout(text);
+    }
+    Ok(atomic::replace(path, |f| f.write_all(text.as_bytes()))?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(result: Result<(), Failure>) -> String {
+        result.expect_err("a clash").to_string()
+    }
+
+    #[test]
+    fn outputs_take_no_other_file_s_place() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::create_dir(dir.path().join("sub")).unwrap();
+        let file = |name: &str| dir.path().join(name);
+        fs::write(file("s.toml"), "").unwrap();
+        let mut files = Files::default();
+        files.reads("the scene", &file("s.toml")).unwrap();
+        files.reads("the scene again", &file("s.toml")).unwrap();
+        files.writes("-o", &file("a.png")).unwrap();
+        let text = message(files.writes_text("--report", &file("sub/../s.toml")));
+        assert!(text.starts_with("--report ") && text.contains("s.toml: that is the scene "));
+        let text = message(files.writes("--watch", &file("./a.png")));
+        assert!(
+            text.ends_with("one would replace the other; name two files"),
+            "{text}"
+        );
+        // Whichever becomes known first.
+        let text = message(files.reads("the rows", &file("a.png")));
+        assert!(text.contains("-o ") && text.ends_with("which would be lost; name another file"));
+        assert_eq!(
+            fs::read_dir(dir.path()).unwrap().count(),
+            2,
+            "nothing was written"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_devices_are_not_files() {
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str| dir.path().join(name);
+        fs::write(file("s.toml"), "").unwrap();
+        symlink("s.toml", file("link.json")).unwrap();
+        symlink("new.png", file("dangling.png")).unwrap();
+        symlink("loop", file("loop")).unwrap();
+        let mut files = Files::default();
+        files.reads("the scene", &file("s.toml")).unwrap();
+        message(files.writes("--report", &file("link.json")));
+        files.writes("-o", &file("dangling.png")).unwrap();
+        message(files.writes("-o", &file("new.png")));
+        files.reads("a loop", &file("loop")).unwrap();
+        for _ in 0..2 {
+            files.writes("--report", Path::new("/dev/null")).unwrap();
+        }
+    }
+
+    #[test]
+    fn standard_output_is_for_one_text() {
+        let mut files = Files::default();
+        let dash = Path::new("-");
+        files.writes_text("--report", dash).unwrap();
+        let text = message(files.writes_text("--dump-wgsl", dash));
+        assert!(text.starts_with("--report - and --dump-wgsl -: "), "{text}");
+        let text = message(files.writes("--html", dash));
+        assert!(text.starts_with("--html -: this goes to a file"), "{text}");
+    }
+
+    #[test]
+    fn films_are_not_named_as_something_else_and_protected_ones_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str| dir.path().join(name);
+        for name in ["f", "f.npz", "f.NPZ", "f.film"] {
+            Files::default().writes_film("--film", &file(name)).unwrap();
+        }
+        for name in ["f.png", "f.EXR", "f.toml"] {
+            let text = message(Files::default().writes_film("--film", &file(name)));
+            assert!(text.contains("its name ends in .npz"), "{text}");
+        }
+        fs::write(file("f.npz"), "").unwrap();
+        let mut permissions = fs::metadata(file("f.npz")).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(file("f.npz"), permissions).unwrap();
+        let refused = Files::default().writes_film("--film", &file("f.npz"));
+        assert_eq!(refused.expect_err("protected").status(), 4);
+    }
+}

@@ -1,0 +1,247 @@
+//! Tables of a scene file, read key by key with the file in hand: what is missing, wrong or unknown is reported with its
+//! place.
+
+use super::format::{self, Found, MaterialKind, Need, Table};
+use super::source::{Faults, Source, quoted, suggestion};
+use super::value::{Text, Value};
+use super::{Bsdf, Place, rows, schema};
+use std::borrow::Cow;
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A table of the file that is being read.
+pub(super) struct Reader<'a, 't> {
+    pub(super) source: &'a Source<'a>,
+    pub(super) faults: &'a mut Faults,
+    /// How it is written: `[camera]`, `[[sphere]]`.
+    what: &'a str,
+    /// Where its header stands; none for the file itself.
+    header: Option<Range<usize>>,
+    pub(super) table: &'a DeTable<'t>,
+    /// The keys it may have: those asked for.
+    known: Vec<&'static str>,
+}
+
+/// Whether an array holds tables alone.
+fn are_tables(all: &[Spanned<DeValue>]) -> bool {
+    !all.is_empty() && all.iter().all(|v| v.get_ref().is_table())
+}
+
+impl Table for Reader<'_, '_> {
+    fn find<T: Value>(&mut self, key: &'static str, need: Need<T>, _: &'static str) -> Found<T> {
+        self.known.push(key);
+        let Some(found) = self.table.get(key) else {
+            if matches!(need, Need::Required) {
+                let message = format!("{} lacks {key}, which must be {}", self.what, T::rule());
+                self.faults.push(self.place(), message);
+            }
+            return Found::Absent;
+        };
+        match T::read(found) {
+            Ok(value) => Found::Value(value),
+            Err(wrong) => {
+                let index = wrong.index.map_or_else(String::new, |i| format!("[{i}]"));
+                let quote = self.source.quote(wrong.span.clone());
+                let value = match found.get_ref() {
+                    // `key.x = 1` and `[[table.key]]` have no text of their own that could be quoted.
+                    DeValue::Table(_) if !quote.starts_with('{') => "a table".into(),
+                    DeValue::Array(all) if are_tables(all) && quote.starts_with("[[") => {
+                        "an array of tables".into()
+                    }
+                    _ => quote,
+                };
+                let message = format!("{key}{index} is {value}; {key} must be {}", T::rule());
+                self.faults.push(Some(wrong.span.start), message);
+                Found::Wrong
+            }
+        }
+    }
+
+    fn refuse(&mut self, key: &str, message: String) {
+        let place = self.place_of(key);
+        self.faults.push(place, message);
+    }
+}
+
+impl<'a, 't> Reader<'a, 't> {
+    pub(super) fn new(
+        source: &'a Source<'a>,
+        faults: &'a mut Faults,
+        what: &'a str,
+        header: Option<Range<usize>>,
+        table: &'a DeTable<'t>,
+    ) -> Self {
+        Self {
+            source,
+            faults,
+            what,
+            header,
+            table,
+            known: Vec::new(),
+        }
+    }
+
+    /// What `read` makes of the file of rows `name`, which lies beside the scene file or where `name` leads from there.
+    pub(super) fn rows<T>(
+        &mut self,
+        name: &str,
+        read: impl FnOnce(&Path, &str) -> Result<Vec<T>, rows::Wrong>,
+    ) -> Option<Vec<T>> {
+        let path = self.source.beside(name);
+        let text = match self.source.rows() {
+            Some(text) => Ok(Cow::Borrowed(text)),
+            None => rows::read(&path).map(Cow::Owned),
+        };
+        match text.and_then(|text| read(&path, &text)) {
+            Ok(rows) => Some(rows),
+            Err(rows::Wrong::Unreadable(why)) => {
+                let place = self.place_of("file");
+                let message = format!("cannot read {}: {why}", path.display());
+                self.faults.push_unreadable(place, message);
+                None
+            }
+            Err(rows::Wrong::Content(errors)) => {
+                self.faults.push_elsewhere(errors);
+                None
+            }
+        }
+    }
+
+    fn place(&self) -> Option<usize> {
+        self.header.as_ref().map(|h| h.start)
+    }
+
+    /// Where the value of `key` stands, or the table that lacks it.
+    fn place_of(&self, key: &str) -> Option<usize> {
+        match self.table.get(key) {
+            Some(value) => Some(value.span().start),
+            None => self.place(),
+        }
+    }
+
+    /// Whether `key` is there, but no array of tables.
+    pub(super) fn is_wrong(&self, key: &str) -> bool {
+        self.table.get(key).is_some_and(|v| !v.get_ref().is_array())
+    }
+
+    /// What `read` finds, and errors for all that it did not ask for.
+    pub(super) fn read_all<T>(&mut self, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
+        let value = read(self);
+        self.refuse_unknown_keys();
+        value
+    }
+
+    /// The one table `key`, written `what`, if it is there.
+    pub(super) fn table(
+        &mut self,
+        key: &'static str,
+        what: &'static str,
+    ) -> Option<Reader<'_, 't>> {
+        self.known.push(key);
+        let value = self.table.get(key)?;
+        match value.get_ref() {
+            DeValue::Table(table) => Some(Reader::new(
+                self.source,
+                self.faults,
+                what,
+                Some(value.span()),
+                table,
+            )),
+            _ => {
+                let found = self.source.quote(value.span());
+                let message = format!("{key} is {found}, but must be one table, {what}");
+                self.faults.push(Some(value.span().start), message);
+                None
+            }
+        }
+    }
+
+    /// What `read` makes of each of the tables `[[key]]` and its place, in file order; none where
+    /// something was wrong.
+    pub(super) fn each<T>(
+        &mut self,
+        key: &'static str,
+        mut read: impl FnMut(&mut Reader<'_, 't>, Place) -> Option<T>,
+    ) -> Vec<Option<T>> {
+        self.known.push(key);
+        let Some(value) = self.table.get(key) else {
+            return Vec::new();
+        };
+        let what = format!("[[{key}]]");
+        let DeValue::Array(items) = value.get_ref() else {
+            let message = format!("{key} must be an array of tables: write {what} for each");
+            self.faults.push(Some(value.span().start), message);
+            return Vec::new();
+        };
+        let mut values = Vec::with_capacity(items.len());
+        for item in items.iter() {
+            let at = item.span().start;
+            let DeValue::Table(table) = item.get_ref() else {
+                let found = self.source.quote(item.span());
+                let message = format!("{what} is {found}, but must be a table");
+                self.faults.push(Some(at), message);
+                values.push(None);
+                continue;
+            };
+            let place = self.source.table_place(at);
+            let header = Some(item.span());
+            let mut t = Reader::new(self.source, self.faults, &what, header, table);
+            values.push(t.read_all(|t| read(t, place)));
+        }
+        values
+    }
+
+    /// This table as a `[material.NAME]`.
+    pub(super) fn material(mut self) -> Option<Bsdf> {
+        let name = self.required::<Text>("type", "")?.0;
+        let names = || MaterialKind::ALL.iter().map(|k| k.name());
+        let Some(&kind) = MaterialKind::ALL.iter().find(|k| k.name() == name) else {
+            let message = format!(
+                "unknown material type {}; allowed: {}{}",
+                quoted(&name),
+                names().collect::<Vec<_>>().join(", "),
+                suggestion(&name, names())
+            );
+            self.refuse("type", message);
+            return None;
+        };
+        self.read_all(|t| format::material(t, kind))
+    }
+
+    pub(super) fn refuse_unknown_keys(&mut self) {
+        for key in self
+            .table
+            .keys()
+            .filter(|k| !self.known.contains(&k.get_ref().as_ref()))
+        {
+            let word = key.get_ref().as_ref();
+            let message = format!(
+                "unknown key {} in {}; allowed: {}{}{}",
+                quoted(word),
+                self.what,
+                self.known.join(", "),
+                suggestion(word, self.known.iter().copied()),
+                self.owners(word)
+            );
+            self.faults.push(Some(key.span().start), message);
+        }
+    }
+
+    /// Which material types have `key`, when this is a material of another.
+    fn owners(&self, key: &str) -> String {
+        if !self.known.contains(&"type") {
+            return String::new();
+        }
+        let owners: Vec<&str> = MaterialKind::ALL
+            .into_iter()
+            .filter(|&kind| schema::material_keys(kind).iter().any(|k| k == key))
+            .map(MaterialKind::name)
+            .collect();
+        if owners.is_empty() {
+            return String::new();
+        }
+        format!("; it belongs to {}", owners.join(" and "))
+    }
+}

@@ -1,0 +1,208 @@
+//! No output takes the place of an input, or of another output: refused before any work, and nothing written.
+
+use crate::program::{Bench, SCENE, says};
+use predicates::prelude::*;
+use std::fs;
+
+/// Names and contents of the folder.
+fn contents(bench: &Bench) -> Vec<(String, Vec<u8>)> {
+    let read = |name: String| {
+        let bytes = fs::read(bench.path(&name)).unwrap_or_default();
+        (name, bytes)
+    };
+    bench.names().into_iter().map(read).collect()
+}
+
+/// Runs each command, which must be refused with this text and leave everything as it was.
+fn refused(bench: &Bench, commands: &[(&str, &str)]) {
+    let before = contents(bench);
+    for (command, text) in commands {
+        bench
+            .run(command)
+            .code(2)
+            .stdout("")
+            .stderr(says("error: ").and(says(text)));
+        assert!(contents(bench) == before, "{command} changed something");
+    }
+}
+
+const LOST: &str = "which would be lost; name another file";
+const TWICE: &str = "one would replace the other; name two files";
+
+/// A scene with both kinds of rows, `rows.toml`.
+fn with_rows(bench: &Bench) {
+    fs::write(bench.path("p.csv"), "x,y,z,radius\n0,0.2,0.5,0.1\n").unwrap();
+    let lamps = "x,y,z,nx,ny,nz,radius,r,g,b\n0,2,0,0,-1,0,0.1,1,1,1\n";
+    fs::write(bench.path("l.csv"), lamps).unwrap();
+    let rows =
+        "[[spheres]]\nfile = \"p.csv\"\nmaterial = \"white\"\n[[lights]]\nfile = \"l.csv\"\n";
+    fs::write(bench.path("rows.toml"), format!("{SCENE}\n{rows}")).unwrap();
+}
+
+#[test]
+fn render_spares_its_scene() {
+    let bench = Bench::new();
+    with_rows(&bench);
+    fs::copy(bench.path("box.toml"), bench.path("x.png")).unwrap();
+    fs::copy(bench.path("box.toml"), bench.path("x.exr")).unwrap();
+    let cpu = |rest: &str| format!("render {rest} --backend cpu --spp 1");
+    let commands = [
+        (cpu("box.toml --report box.toml -o a.png"), LOST),
+        (cpu("box.toml --report ./box.toml -o a.png"), LOST),
+        (cpu("box.toml --dump-wgsl box.toml -o a.png"), LOST),
+        (cpu("box.toml --film box.toml -o a.png"), LOST),
+        (cpu("rows.toml --report p.csv -o a.png"), LOST),
+        (cpu("rows.toml --dump-wgsl l.csv -o a.png"), LOST),
+        (cpu("x.png -o x.png"), LOST),
+        (cpu("x.png -o a.png --watch x.png"), LOST),
+        // By default.
+        (
+            cpu("x.png"),
+            "the picture (--output names another) x.png: that is the scene, which",
+        ),
+        (cpu("x.exr"), "x.exr: that is the scene, which"),
+    ];
+    let commands: Vec<(&str, &str)> = commands.iter().map(|(c, t)| (c.as_str(), *t)).collect();
+    refused(&bench, &commands);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("x.png", bench.path("link.png")).unwrap();
+        refused(
+            &bench,
+            &[(
+                &cpu("x.png -o link.png"),
+                "link.png: that is the scene x.png, which",
+            )],
+        );
+    }
+}
+
+#[test]
+fn no_two_outputs_are_one() {
+    let bench = Bench::new();
+    bench.render("--spp 1 --film f.npz -o f.png");
+    fs::create_dir(bench.path("sub")).unwrap();
+    let cpu = |rest: &str| format!("render box.toml --backend cpu --spp 2 {rest}");
+    let commands = [
+        cpu("-o a.png --report a.png"),
+        cpu("-o a.png --dump-wgsl a.png"),
+        cpu("-o a.png --watch a.png"),
+        cpu("-o a.png -o ./a.png"),
+        cpu("-o a.png -o sub/../a.png"),
+        cpu("--film f.npz --report f.npz -o a.png"),
+        cpu("--film f.npz --dump-wgsl ./f.npz -o a.png"),
+        cpu("-o a.png --report - --dump-wgsl -"),
+    ];
+    let commands: Vec<(&str, &str)> = commands.iter().map(|c| (c.as_str(), TWICE)).collect();
+    refused(&bench, &commands);
+    // A film is gone on with.
+    bench.render("--spp 2 --film f.npz -o a.png --report r.json --dump-wgsl k.wgsl --watch w.png");
+    assert_eq!(bench.film("f.npz").coverage.samples(), (2, 2));
+}
+
+#[test]
+fn films_and_pictures_that_are_read_stay() {
+    let bench = Bench::new();
+    bench.render("--spp 8 --film f.npz -o a.exr");
+    fs::copy(bench.path("f.npz"), bench.path("film.png")).unwrap();
+    fs::copy(bench.path("a.exr"), bench.path("b.exr")).unwrap();
+    fs::create_dir(bench.path("golden")).unwrap();
+    fs::copy(bench.path("a.exr"), bench.path("golden/box.exr")).unwrap();
+    with_rows(&bench);
+    refused(
+        &bench,
+        &[
+            ("compare a.exr b.exr --html a.exr", LOST),
+            ("compare a.exr b.exr --html ./b.exr", LOST),
+            (
+                "compare a.exr b.exr --html -",
+                "--html -: this goes to a file",
+            ),
+            ("develop film.png -o film.png", LOST),
+            ("develop f.npz -o c.png -o ./c.png", TWICE),
+            (
+                "render box.toml --backend cpu --spp 16 --film film.png -o film.png",
+                TWICE,
+            ),
+            ("bench box.toml --engine cpu --json box.toml", LOST),
+            ("bench rows.toml --engine cpu --json p.csv", LOST),
+            (
+                "bench box.toml --engine cpu --reference a.exr --json a.exr",
+                LOST,
+            ),
+            (
+                "bench box.toml --engine cpu --plot a.svg --plot ./a.svg",
+                TWICE,
+            ),
+            (
+                "bench box.toml --engine cpu --plot a.svg --json a.svg",
+                TWICE,
+            ),
+            ("regress . --backend cpu --junit box.toml", LOST),
+            ("regress . --backend cpu --html golden/box.exr", LOST),
+            ("regress . --backend cpu --html p.csv", LOST),
+            ("regress . --backend cpu --html r --junit r", TWICE),
+            (
+                "regress . --backend cpu --html -",
+                "--html -: this goes to a file",
+            ),
+            (
+                "make-scene spheres --count 1000 -o y.csv",
+                "a scene's name ends in .toml",
+            ),
+            (
+                "make-scene lights --count 3 -o y",
+                "a scene's name ends in .toml",
+            ),
+            ("merge x.png f.npz", "its name ends in .npz"),
+            (
+                "render box.toml --backend cpu --film x.exr -o a.png",
+                "its name ends in .npz",
+            ),
+        ],
+    );
+}
+
+#[test]
+fn text_goes_to_stdout_by_the_same_name_everywhere() {
+    let bench = Bench::new();
+    bench
+        .run("render box.toml --backend cpu --spp 1 -o a.png --dump-wgsl - --quiet")
+        .success()
+        .stdout(says("@compute"));
+    fs::create_dir(bench.path("scenes")).unwrap();
+    fs::copy(bench.path("box.toml"), bench.path("scenes/box.toml")).unwrap();
+    bench
+        .run("regress scenes --backend cpu --junit -")
+        .code(1)
+        .stdout(predicate::str::starts_with("<?xml").and(says("</testsuites>")))
+        .stderr(says("1 scene: 1 new"));
+    assert_eq!(bench.names(), ["a.png", "box.toml", "scenes"]);
+}
+
+/// A film may have any name that says nothing else, and is known by its content.
+#[test]
+fn films_of_other_names() {
+    let bench = Bench::new();
+    bench.render("--spp 16 --film f -o a.exr");
+    bench
+        .run("compare a.exr f")
+        .success()
+        .stdout(says("the same"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_write_protected_film_is_not_gone_on_with() {
+    use std::os::unix::fs::PermissionsExt;
+    let bench = Bench::new();
+    bench.render("--spp 1 --film f.npz -o a.png");
+    let before = fs::read(bench.path("f.npz")).unwrap();
+    fs::set_permissions(bench.path("f.npz"), fs::Permissions::from_mode(0o444)).unwrap();
+    bench
+        .run("render box.toml --backend cpu --spp 4 --film f.npz -o a.png")
+        .code(4)
+        .stderr("error: f.npz: cannot write: the film is write-protected\n");
+    assert!(fs::read(bench.path("f.npz")).unwrap() == before);
+    bench.run("develop f.npz -o b.png").success();
+}
