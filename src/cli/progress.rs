@@ -215,6 +215,7 @@ pub fn clock(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::coverage::Rect;
     use crate::run::Forecast;
 
     #[test]
@@ -232,6 +233,34 @@ mod tests {
             "255 samples, 99 %, 0.0 s left, relative error 1.23 %"
         );
         assert_eq!(describe(&Tally::default(), None), "0.0 samples");
+    }
+
+    /// What a large picture's line says between two looks, and that it looks again when that is cheap.
+    #[test]
+    fn the_error_is_never_an_old_one() {
+        let rect = Rect::whole([1, 1]);
+        let mut film = Film::new([1, 1], rect, 1);
+        film.put_samples(rect, 0..4, vec![[[0.5, 0.5, 0.5, 0.25]; 4]]);
+        let mut tally = Tally {
+            samples: 256.0,
+            ..Tally::default()
+        };
+        let looked = |took| Looks {
+            last: Some(Look {
+                samples: 64.0,
+                error: Some(0.2),
+                done: Instant::now(),
+                took,
+            }),
+        };
+        let hour = Duration::from_secs(3600);
+        assert_eq!(looked(hour).error(&film, &tally), None, "of a part alone");
+        tally.complete = true;
+        let between = looked(hour).error(&film, &tally);
+        assert_eq!(between.as_deref(), Some("about 10.0 %"));
+        for mut looks in [looked(Duration::ZERO), Looks::default()] {
+            assert_eq!(looks.error(&film, &tally).as_deref(), Some("0 %"));
+        }
     }
 
     #[test]

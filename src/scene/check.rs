@@ -198,7 +198,8 @@ radiance = [9, 9, 9]
 
     #[test]
     fn idle_materials() {
-        assert!(warned(&room(), "material \"glass\" is used by nothing"));
+        let idle = "test.toml:12:1: material \"glass\" is used by nothing";
+        assert!(warned(&room(), idle));
         assert!(!warned(&room(), "material \"white\""));
         let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'ghost'\n";
         let ghost = |keys: &str| format!("{ball}[material.ghost]\ntype = 'dielectric'\n{keys}\n");
