@@ -51,7 +51,7 @@ fn bench_refuses_what_it_cannot_do() {
         ("--report-table --plot a.svg", "cannot be used with"),
         ("box.toml --scaling", "cannot be used with"),
         ("--scaling --reference a.exr", "cannot be used with"),
-        ("--scaling --up-to 0", "0 is not in"),
+        ("--scaling --up-to 0", "a whole number from 1 to 5000000"),
         ("box.toml --up-to 8", "cannot be used with"),
     ] {
         bench

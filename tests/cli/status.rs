@@ -181,6 +181,12 @@ fn negative_values_are_told_the_rule() {
             "-1",
             "a whole number from 1 to 1024",
         ),
+        (
+            "bench --scaling",
+            "--up-to",
+            "-1",
+            "a whole number from 1 to 5000000",
+        ),
         ("bench box.toml", "--max-spp", "-1", "a whole number, 1 to"),
     ] {
         let text = format!("error: invalid value '{value}' for '{flag} <");

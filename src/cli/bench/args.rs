@@ -59,7 +59,7 @@ pub struct BenchArgs {
     pub scaling: bool,
     /// The most spheres, and lights, of --scaling
     #[arg(long, value_name = "N", default_value_t = 100_000, conflicts_with_all = ["scenes", "report_table"],
-          value_parser = clap::value_parser!(u32).range(1..=5_000_000))]
+          value_parser = values::whole::<u32>(1, 5_000_000), allow_hyphen_values = true)]
     pub up_to: u32,
 
     /// Hold pictures against this one, an .exr or a film of the same scene, instead of making one
