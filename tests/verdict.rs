@@ -285,7 +285,7 @@ fn faults_are_seen() {
 #[test]
 #[ignore = "four hundred pictures of up to 25 million paths: an hour or two"]
 fn power_curve_of_an_exponent() {
-    for samples in [1024, 2048] {
+    for samples in [1024, 1536, 2048] {
         let seen = seen(&exponent(11.0), [128, 96], samples, 100);
         println!("exponent 10 -> 11, {samples} samples: {seen} of 100");
     }
