@@ -75,7 +75,7 @@ fn cap_pdf(light: DiskLight, cap: Cap, d: vec3f) -> f32 {
     return select(0.0, fmax(chord, 0.0) / (3.14159265 * fmax(cap.height, TINY_SQUARE)), cap.height > 0.0);
 }
 
-#if SEVERAL_LIGHTS
+#if LIGHT_WEIGHTS
 // About what the light would send to a receiver at p with normal n if nothing were in between, up to a factor: the
 // irradiance of a disk far away, r^2 cos cos / d^2, with every length made longer by the radius. That keeps it finite
 // and about right near the light, keeps every light that can contribute, and costs one quotient. 0 only where the light

@@ -8,7 +8,7 @@ use crate::settings::{Integrator, LightParts, Settings};
 use serde::{Deserialize, Serialize, Serializer};
 
 /// Changes whenever a sample of the same number and seed gets another value.
-pub const SAMPLER_VERSION: u32 = 4;
+pub const SAMPLER_VERSION: u32 = 5;
 
 /// What a film was made from, by and on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -282,7 +282,7 @@ pub(crate) mod tests {
             ("shadow_rays is 1 and 2", |p| p.settings.shadow_rays = 2),
             ("seed is 4294967295 and 7", |p| p.settings.seed = 7),
             (
-                "sampler is 4 (of version 0.1.0) and 9 (of version 9)",
+                "sampler is 5 (of version 0.1.0) and 9 (of version 9)",
                 |p| (p.sampler_version, p.version) = (9, "9".into()),
             ),
             (

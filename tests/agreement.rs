@@ -141,7 +141,8 @@ fn main() {
 
 /// Scenes with what the figures lack: nested and planar glass, an eye in glass, lights in glass and half in it, lights flush and near,
 /// stacked and on ends of cylinders, coplanar things, a room of huge spheres, a scene far from the origin.
-const HARD: [(&str, &str); 11] = [
+const HARD: [(&str, &str); 12] = [
+    ("mirror_balls", include_str!("scenes/mirror_balls.toml")),
     ("nested_glass", include_str!("scenes/nested_glass.toml")),
     ("water", include_str!("scenes/water.toml")),
     ("eye_in_glass", include_str!("scenes/eye_in_glass.toml")),

@@ -1,6 +1,7 @@
 //! The kernel made for one scene: the modules of `shaders/` that it needs, constants, and the generated
 //! functions that meet its primitives and choose its lights.
 
+mod images;
 pub(crate) mod lights;
 mod literal;
 mod near;
@@ -74,7 +75,7 @@ pub(crate) fn shape_tag(geometry: &Geometry) -> u32 {
 }
 
 /// The modules of `shaders/`, in the order in which they are read.
-pub const MODULES: [(&str, &str); 18] = [
+pub const MODULES: [(&str, &str); 19] = [
     ("ray", include_str!("../../shaders/ray.wgsl")),
     ("frame", include_str!("../../shaders/frame.wgsl")),
     ("sampler", include_str!("../../shaders/sampler.wgsl")),
@@ -93,13 +94,17 @@ pub const MODULES: [(&str, &str); 18] = [
     ("dielectric", include_str!("../../shaders/dielectric.wgsl")),
     ("phong", include_str!("../../shaders/phong.wgsl")),
     ("surface", include_str!("../../shaders/surface.wgsl")),
+    ("image", include_str!("../../shaders/image.wgsl")),
     ("records", include_str!("../../shaders/records.wgsl")),
     ("tree", include_str!("../../shaders/tree.wgsl")),
     ("light_tree", include_str!("../../shaders/light_tree.wgsl")),
 ];
 
-/// The entry point and the path loop.
-const PATH: &str = include_str!("../../shaders/path.wgsl");
+/// The entry point and the path loop, and what the loop does at a vertex.
+const PATH: [(&str, &str); 2] = [
+    ("path", include_str!("../../shaders/path.wgsl")),
+    ("scatter", include_str!("../../shaders/scatter.wgsl")),
+];
 
 /// A composed kernel.
 #[derive(Debug, Clone)]
@@ -119,16 +124,27 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     let features = features(world, settings, access);
     let mut wgsl = String::from("// Made for one scene by etendue.\n\n");
     wgsl.push_str(&scene_text(world, settings, access, &features));
-    let _ = write!(
-        wgsl,
-        "\n// ---- path.wgsl\n\n{}",
-        preprocess::run(PATH, &features)
-    );
+    for (name, text) in PATH {
+        let _ = write!(
+            wgsl,
+            "\n// ---- {name}.wgsl\n\n{}",
+            preprocess::run(text, &features)
+        );
+    }
     let trips_per_sample = match access {
         Access::Tree => 0,
         Access::Baked | Access::Buffers => {
-            u64::from(last_depth(settings)).saturating_mul(trips_at_vertex(world, settings, access))
-                + trips_at_start(world, access, &features)
+            let vertices = u64::from(last_depth(settings));
+            let trips = vertices.saturating_mul(trips_at_vertex(world, settings, access))
+                + trips_at_start(world, access, &features);
+            // The loop over turns is in one of its own then, which goes round no more often.
+            let turns = vertices + u64::from(GLANCES * GLANCES);
+            trips
+                + if features.contains("IMAGES") {
+                    turns
+                } else {
+                    0
+                }
         }
     };
     Kernel {
@@ -210,6 +226,10 @@ fn scene_text(
     }
     s.push_str("\n// ---- this scene\n\n");
     s.push_str(&rays::generate(world, access, features));
+    let images = images::of(world, settings, access);
+    if !images.is_empty() {
+        s.push_str(&images::generate(world, &images));
+    }
     s
 }
 
@@ -220,7 +240,8 @@ pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
     let mut s = String::new();
     tags(&mut s);
     for (name, text) in MODULES {
-        if !["camera", "surface", "records", "tree", "light_tree"].contains(&name) {
+        let of_scenes = ["camera", "surface", "records", "tree", "light_tree"].contains(&name);
+        if !of_scenes && (name != "image" || features.contains("IMAGES")) {
             s.push_str(&preprocess::run(text, &features));
         }
     }
@@ -334,6 +355,12 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
         sampling && access == Access::Tree && records::clustered(world),
     );
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
+    let images = images::of(world, settings, access);
+    set("IMAGES", !images.is_empty());
+    set(
+        "LIGHT_WEIGHTS",
+        !images.is_empty() || sampling && world.lights.len() > 1,
+    );
     set(
         "EXTREME_LIGHTS",
         world
@@ -381,6 +408,7 @@ fn needs(name: &str, features: &BTreeSet<&str>) -> bool {
         "mirror" => has("MIRROR") || has("DIELECTRIC") || has("PHONG"),
         "dielectric" => has("DIELECTRIC"),
         "phong" => has("PHONG"),
+        "image" => has("IMAGES"),
         "records" | "tree" => has("TREE"),
         "light_tree" => has("LIGHT_TREE"),
         _ => true,

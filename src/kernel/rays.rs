@@ -52,7 +52,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
             s.push_str(CHOSEN);
             s.push_str(&lights::constants(world));
         } else {
-            s.push_str(&light_choice(world, access));
+            s.push_str(&light_choice(world, access, features));
         }
     }
     s.push('\n');
@@ -429,12 +429,20 @@ struct Chosen {
 ";
 
 /// Chooses one light with probability in proportion to its weight.
-fn light_choice(world: &World, access: Access) -> String {
+fn light_choice(world: &World, access: Access, features: &BTreeSet<&str>) -> String {
     let mut s = String::from(CHOSEN);
     s.push_str("fn choose_light(p: vec3f, n: vec3f, u: f32) -> Chosen {\n");
     if let [only] = world.lights.as_slice() {
         let _ = writeln!(s, "    let light = {};", light_literal(only));
-        s.push_str("    return Chosen(light, 0u, cap_of(light, p), 1.0, 1.0);\n}\n");
+        // Images are chosen against the light's own weight.
+        let weight = match features.contains("LIGHT_WEIGHTS") {
+            true => "light_weight(light, p, n)",
+            false => "1.0",
+        };
+        let _ = writeln!(
+            s,
+            "    return Chosen(light, 0u, cap_of(light, p), 1.0, {weight});\n}}"
+        );
         return s;
     }
     // With trees, lights too few for a tree of their own are chosen as in a small scene.

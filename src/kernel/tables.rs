@@ -61,7 +61,7 @@ fn light_at(index: u32) -> DiskLight {
 }
 
 /// The fields of a struct, by name; WGSL's zero is their default.
-type Fields = Vec<(&'static str, String)>;
+pub(super) type Fields = Vec<(&'static str, String)>;
 
 fn vector(fields: &mut Fields, names: [&'static str; 3], v: DVec3) {
     for (name, x) in names.into_iter().zip(v.to_array()) {
@@ -139,7 +139,7 @@ fn material_fields(bsdf: &Bsdf) -> Fields {
     f
 }
 
-fn light_fields(l: &WorldLight) -> Fields {
+pub(super) fn light_fields(l: &WorldLight) -> Fields {
     let mut f = vec![
         ("radius", float(l.radius)),
         ("offset", float(l.offset)),
@@ -157,7 +157,7 @@ fn light_fields(l: &WorldLight) -> Fields {
 
 /// A function that selects a struct of type `kind` by `index`: element k of `elements` where `index` is its number.
 /// What all elements have in common is set once; zeros need not be set.
-fn chain(name: &str, kind: &str, index: &str, elements: &[(u32, Fields)]) -> String {
+pub(super) fn chain(name: &str, kind: &str, index: &str, elements: &[(u32, Fields)]) -> String {
     let mut s = format!("    var s: {kind};\n");
     let zero = |v: &str| v == "0.0" || v == "0u";
     let value =
