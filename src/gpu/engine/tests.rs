@@ -62,18 +62,6 @@ fn a_tile_that_no_texture_holds_is_an_error() {
 }
 
 #[test]
-fn strides_visit_every_group() {
-    for groups in [1, 2, 3, 7, 64, 3072, 16384] {
-        let stride = coprime_stride(groups);
-        let mut seen = vec![false; groups as usize];
-        for g in 0..groups {
-            seen[(u64::from(g) * u64::from(stride) % u64::from(groups)) as usize] = true;
-        }
-        assert!(seen.iter().all(|s| *s), "{groups} groups, stride {stride}");
-    }
-}
-
-#[test]
 fn samples_that_are_not_finite_are_left_out_and_counted_by_replicate() {
     let add = "let l = path.radiance;";
     // One in every replicate's first round but the last's: samples 1, 5 and 9, and the same 256 later.
