@@ -438,3 +438,20 @@ fn an_adaptive_forecast_grows_to_its_end() {
     let last = fractions.pop().unwrap();
     assert!(last > 0.99 && fractions[0] < 0.1, "{last}");
 }
+
+/// All tiles are called at once, each for the samples that it lacks.
+#[test]
+fn an_adaptive_wave_is_a_few_large_calls() {
+    let size = [80, 48];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let mut job = job(size, 2000, 0..150);
+    job.adaptive = Some(5);
+    let mut engine = Fake::new();
+    // No two tiles find the same.
+    engine.value = |h| if (h >> 32) % 1000 == 0 { 1000.0 } else { 0.0 };
+    assert_eq!(run(&job, &mut engine, &mut film), StopReason::Samples);
+    // Two bands, and for each: the first samples, the others before the pilot, the pilot, two waves and a second block.
+    assert!(engine.calls.len() <= 14, "{} calls", engine.calls.len());
+    let differ = |parts: &Vec<Part>| parts.iter().any(|p| p.samples != parts[0].samples);
+    assert!(engine.calls.iter().any(differ));
+}
