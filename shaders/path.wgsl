@@ -4,11 +4,10 @@ struct Params {
     // Top left pixel of the tile, and its width and height.
     tile: vec2u,
     size: vec2u,
-    // Range of sample numbers.
-    first: u32,
-    end: u32,
-    // 1: the running sums start at zero.
-    fresh: u32,
+    // Its width times its height.
+    pixels: u32,
+    // Samples of each pixel that the dispatch may do, for the driver's limit on loop trips.
+    most: u32,
     seed: u32,
     // Workgroups of the tile, the number of the dispatch's first one, and a stride without a common divisor:
     // consecutive groups go far apart, so that a driver which hands each thread a contiguous share gives all of them
@@ -16,8 +15,7 @@ struct Params {
     groups: u32,
     first_group: u32,
     stride: u32,
-    // 1: goes on where the last dispatch could not finish its samples for want of loop trips; and how many there are.
-    resume: u32,
+    // Loop trips there are.
     trips: u32,
     // 2, which no compiler knows.
     rounds: u32,
@@ -31,17 +29,17 @@ struct Params {
 // that was not finite; how many of those replicates 0 and 1 had, in a half each; and replicates 2 and 3.
 @group(1) @binding(3) var<storage, read_write> counters: array<vec4u>;
 
-#if TREE
-// What is left to a later dispatch for want of loop trips.
+// What is left to do.
 struct Left {
-    // How many pixels have unfinished samples, and 1 + the last of those of which not one sample could be finished.
+    // Of how many pixels the dispatch could not do its samples for want of loop trips, and 1 + the last of those of which
+    // not one sample could be finished.
     unfinished: atomic<u32>,
     stuck: atomic<u32>,
-    // For each pixel of the tile: the sample to begin with. Then for each pixel: 1 if it may see a light.
+    // For each pixel of the tile: the sample to begin with. Then for each: one past its last. Then for each, in kernels
+    // with trees: 1 if it may see a light.
     next: array<u32>,
 }
 @group(1) @binding(4) var<storage, read_write> left: Left;
-#endif
 
 struct Path {
     ray: Ray,
@@ -102,7 +100,7 @@ fn begin(glances: u32) -> Path {
 #if TREE
 // Where lights are many the host has looked for them.
 fn glances_at(index: u32) -> u32 {
-    let seen = left.next[params.size.x * params.size.y + index];
+    let seen = left.next[2u * params.pixels + index];
     return select(0u, GLANCES * GLANCES, seen == 1u);
 }
 #else
@@ -136,7 +134,7 @@ fn glances_at(pixel: vec2u) -> u32 {
 @compute @workgroup_size(64)
 fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let index = (params.first_group + group.x) * params.stride % params.groups * 64u + lane;
-    if index >= params.size.x * params.size.y {
+    if index >= params.pixels {
         return;
     }
     let texel = vec2u(index % params.size.x, index / params.size.x);
@@ -148,7 +146,11 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var sum_1 = vec4f(0.0);
     var sum_2 = vec4f(0.0);
     var sum_3 = vec4f(0.0);
-    if params.fresh == 0u {
+    let first = left.next[index];
+    let wanted = left.next[params.pixels + index];
+    let end = first + min(wanted - first, params.most);
+    // A block's sums start at zero. Those of a pixel without samples go from one texture to the other.
+    if first % BLOCK != 0u || first == end {
         sum_0 = textureLoad(running_in, texel, 0, 0);
         sum_1 = textureLoad(running_in, texel, 1, 0);
         sum_2 = textureLoad(running_in, texel, 2, 0);
@@ -156,12 +158,8 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     }
     var count = counters[index];
 
-    var s = params.first;
+    var s = first;
 #if TREE
-    if params.resume == 1u {
-        s = left.next[index];
-    }
-    let first = s;
     // A sample that uses up the trips is begun again by the next dispatch: nothing of it is kept.
     trips_left = params.trips - min(params.trips, TRIPS_AT_START + TRIPS_AT_VERTEX);
     var before = count;
@@ -180,14 +178,14 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances));
     // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
 #if TREE
-    while s < params.end && going {
+    while s < end && going {
 #else
-    while s < params.end {
+    while s < end {
 #endif
 #if IMAGES
     // Few paths are sent to images, and a software adapter goes through a conditional statement for all lanes as soon as it
     // meets it: so that is done once every few turns.
-    for (var turn = 0u; turn < TURNS && s < params.end && !path.sends; turn++) {
+    for (var turn = 0u; turn < TURNS && s < end && !path.sends; turn++) {
 #endif
         var alive = false;
         let hit = intersect(path.ray);
@@ -271,9 +269,9 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         }
 #endif
     }
-#if TREE
     left.next[index] = s;
-    if s < params.end {
+#if TREE
+    if s < end {
         count = before;
         atomicAdd(&left.unfinished, 1u);
         atomicMax(&left.stuck, select(0u, index + 1u, s == first));

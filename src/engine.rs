@@ -18,20 +18,48 @@ pub fn tile_pixels(device: &DeviceInfo) -> u64 {
     }
 }
 
+/// Samples of the pixels of a rectangle.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Part {
+    /// The pixels.
+    pub rect: Rect,
+    /// The numbers of the samples of each: at least one.
+    pub samples: Range<u64>,
+}
+
+impl Part {
+    /// Paths: samples times pixels.
+    pub fn paths(&self) -> u64 {
+        self.rect.area() * (self.samples.end - self.samples.start)
+    }
+}
+
 /// Makes samples.
 pub trait Engine {
-    /// Adds the samples numbered `samples` of every pixel of `rect` to `film`.
+    /// Adds the samples of `parts` to `film`: each has samples of its own, and pixels of `tile` that are in none get none.
     ///
-    /// `samples` lies within one [block](crate::film::BLOCK); the pixels of `rect`, at most
-    /// [`MAX_TILE_PIXELS`], have had the same samples so far, and none of these. When `stop` becomes
-    /// true the call may give up with [`EngineError::Stopped`]; on any error the film is as it was.
+    /// The parts are disjoint and lie in `tile`, which has at most [`MAX_TILE_PIXELS`]; calls for the same tile one after
+    /// another are the cheapest. The samples of a part lie within one [block](crate::film::BLOCK); its pixels have had the
+    /// same of that block so far, and none of these. When `stop` becomes true the call may give up with
+    /// [`EngineError::Stopped`]; on any error the film is as it was.
+    fn render_parts(
+        &mut self,
+        film: &mut Film,
+        tile: Rect,
+        parts: &[Part],
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError>;
+
+    /// [`render_parts`](Self::render_parts) with a single part, of all pixels of `rect`.
     fn render(
         &mut self,
         film: &mut Film,
         rect: Rect,
         samples: Range<u64>,
         stop: &AtomicBool,
-    ) -> Result<Counters, EngineError>;
+    ) -> Result<Counters, EngineError> {
+        self.render_parts(film, rect, &[Part { rect, samples }], stop)
+    }
 
     /// Goes on with another seed.
     fn reseed(&mut self, seed: u32);

@@ -5,7 +5,7 @@
 //! not depend on how they were cut ([`crate::film`]). Error is looked at only after sample counts
 //! of a fixed sequence, so that the same request stops at the same sample on every machine.
 
-use crate::engine::{Counters, Engine, EngineError, MAX_TILE_PIXELS};
+use crate::engine::{Counters, Engine, EngineError, MAX_TILE_PIXELS, Part};
 use crate::film::coverage::{Coverage, Rect};
 use crate::film::{BLOCK, Film, REPLICATES};
 use std::ops::Range;
@@ -216,14 +216,15 @@ impl<'a> Run<'a> {
             let learning = self.pace.is_none();
             for tile in &job.tiles {
                 for (rect, ranges) in self.film.coverage.missing(*tile, at..end) {
-                    for part in ranges {
+                    for samples in ranges {
+                        let part = [Part { rect, samples }];
                         if self.stop.load(Ordering::Relaxed) {
                             return Ok(StopReason::Interrupted);
                         }
-                        if self.too_late(rect, &part) {
+                        if self.too_late(&part) {
                             return Ok(StopReason::Time);
                         }
-                        if !self.call(rect, part)? {
+                        if !self.call(rect, &part)? {
                             return Ok(StopReason::Interrupted);
                         }
                         self.tally.forecast = self.forecast();
@@ -239,11 +240,10 @@ impl<'a> Run<'a> {
     }
 
     /// One call to the engine; false when it was stopped.
-    fn call(&mut self, rect: Rect, samples: Range<u64>) -> Result<bool, EngineError> {
-        let work = rect.area() as f64 * (samples.end - samples.start) as f64;
-        let done = self.call_on(None, rect, samples)?;
+    fn call(&mut self, tile: Rect, parts: &[Part]) -> Result<bool, EngineError> {
+        let done = self.call_on(None, tile, parts)?;
         if done {
-            self.tally.samples += work / self.pixels as f64;
+            self.tally.samples += paths(parts) / self.pixels as f64;
             self.tally.complete = self.tally.complete || is_complete(&self.film.coverage, self.job);
         }
         Ok(done)
@@ -253,13 +253,12 @@ impl<'a> Run<'a> {
     fn call_on(
         &mut self,
         other: Option<&mut Film>,
-        rect: Rect,
-        samples: Range<u64>,
+        tile: Rect,
+        parts: &[Part],
     ) -> Result<bool, EngineError> {
-        let work = rect.area() as f64 * (samples.end - samples.start) as f64;
         let begun = Instant::now();
         let film = other.unwrap_or(self.film);
-        let result = self.engine.render(film, rect, samples, self.stop);
+        let result = self.engine.render_parts(film, tile, parts, self.stop);
         let seconds = begun.elapsed().as_secs_f64();
         self.tally.seconds += seconds;
         match result {
@@ -267,7 +266,7 @@ impl<'a> Run<'a> {
             Err(EngineError::Stopped) => return Ok(false),
             Err(e) => return Err(e),
         }
-        self.pace = Some(seconds / work);
+        self.pace = Some(seconds / paths(parts));
         Ok(true)
     }
 
@@ -299,15 +298,15 @@ impl<'a> Run<'a> {
 
     /// Whether the time is over, or would be before half of this call were done. The first sample of
     /// a pixel is never too late: a picture has no holes.
-    fn too_late(&self, rect: Rect, samples: &Range<u64>) -> bool {
+    fn too_late(&self, parts: &[Part]) -> bool {
         let Some(time) = self.job.time else {
             return false;
         };
-        if samples.start == self.job.samples.start {
+        let first = self.job.samples.start;
+        if parts.iter().any(|p| p.samples.start == first) {
             return false;
         }
-        let work = rect.area() as f64 * (samples.end - samples.start) as f64;
-        self.tally.seconds + self.pace.unwrap_or(0.0) * work / 2.0 > time.as_secs_f64()
+        self.tally.seconds + self.pace.unwrap_or(0.0) * paths(parts) / 2.0 > time.as_secs_f64()
     }
 
     /// Looks at the error after `count` samples of every pixel if it may end the run; whether it is small enough.
@@ -359,6 +358,11 @@ fn first_missing(coverage: &Coverage, job: &Job, from: u64) -> u64 {
         .filter_map(|(_, ranges)| ranges.first().map(|r| r.start))
         .min()
         .unwrap_or(job.samples.end)
+}
+
+/// Paths of a call.
+fn paths(parts: &[Part]) -> f64 {
+    parts.iter().map(|p| p.paths() as f64).sum()
 }
 
 /// See [`Tally::complete`].

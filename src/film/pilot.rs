@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 const SIDE: u32 = 16;
 
 /// Tiles of a picture, about, at most: those of large pictures are larger.
-const TILES: u64 = 256;
+const TILES: u64 = 2048;
 
 /// Share of the samples that is spread evenly.
 const DEFENCE: f64 = 0.25;
@@ -377,7 +377,7 @@ mod tests {
     #[test]
     fn tiles_of_large_pictures_are_larger_and_regions_are_kept() {
         let tiles = Pilot::new(&[Rect::whole([3840, 2160])]).tiles();
-        assert!((64..=300).contains(&tiles.len()), "{}", tiles.len());
+        assert!((512..=2100).contains(&tiles.len()), "{}", tiles.len());
         let regions = [
             Rect {
                 x0: 5,

@@ -1,11 +1,11 @@
 //! Dispatches: samples are cut into submissions by measured cost, which touches no bit of the picture.
 
-use super::adapters::WORKGROUP;
 use super::pack::{Params, pack};
 use super::seen::SeenLights;
 use super::tile::{self, Tile};
+use super::work::{Work, coprime_stride, workgroups};
 use super::{Choice, Gpu, GpuError, scene};
-use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
+use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::coverage::Rect;
 use crate::film::{BLOCK, Film, REPLICATES, Sums};
 use crate::kernel::{Access, Kernel, compose};
@@ -44,7 +44,7 @@ pub struct GpuEngine {
 
 /// Running sums that lie in a tile's textures.
 struct Held {
-    rect: Rect,
+    tile: Rect,
     /// Which texture.
     place: usize,
     /// The sums, rows of the tile.
@@ -52,19 +52,29 @@ struct Held {
 }
 
 impl Held {
-    /// Whether the film goes on from just these sums: they need not be put into the textures again then.
-    fn is_in(&self, film: &Film, rect: Rect) -> bool {
-        let width = rect.width() as usize;
-        self.rect == rect
+    /// Whether the parts that go on with a block go on from just these sums: they need not be put into the textures again
+    /// then.
+    fn serves(&self, film: &Film, tile: Rect, parts: &[Part]) -> bool {
+        let same = |rect: Rect, y: u32| {
+            let width = rect.width() as usize;
+            let here =
+                (y - tile.y0) as usize * tile.width() as usize + (rect.x0 - tile.x0) as usize;
+            let there = film.index(rect.x0, y);
+            let bytes: &[u8] = bytemuck::cast_slice(&self.running[here..here + width]);
+            bytes == bytemuck::cast_slice::<_, u8>(&film.partial()[there..there + width])
+        };
+        self.tile == tile
             && !film.partial().is_empty()
-            && (rect.y0..rect.y1)
-                .zip(self.running.chunks_exact(width))
-                .all(|(y, row)| {
-                    let at = film.index(rect.x0, y);
-                    let bytes: &[u8] = bytemuck::cast_slice(row);
-                    bytes == bytemuck::cast_slice::<_, u8>(&film.partial()[at..at + width])
-                })
+            && parts
+                .iter()
+                .filter(|p| goes_on(p))
+                .all(|p| (p.rect.y0..p.rect.y1).all(|y| same(p.rect, y)))
     }
+}
+
+/// Whether a part goes on with a block that is begun.
+fn goes_on(part: &Part) -> bool {
+    !part.samples.start.is_multiple_of(BLOCK)
 }
 
 impl GpuEngine {
@@ -221,7 +231,7 @@ impl GpuEngine {
             y1: 1,
         };
         self.prepare_tile(rect)?;
-        self.dispatch(rect, 0..0, 0..1, None, false)?;
+        self.dispatch(rect, 0, 0..1, 0)?;
         self.tile = None;
         Ok(())
     }
@@ -259,21 +269,21 @@ impl GpuEngine {
         self.kernel.access == Access::Tree
     }
 
-    /// Dispatches `samples` of the pixels of some of the workgroups of `rect` until all are done. `place` says which
-    /// texture holds the running sums (`None`: they start at zero); the new ones are in the other in the end.
+    /// Dispatches up to `most` samples of each pixel of some of the workgroups of `rect` until all are done. `place` says
+    /// which texture holds the running sums; the new ones are in the other in the end.
     fn submit(
         &self,
         rect: Rect,
-        samples: Range<u64>,
+        most: u64,
         groups: Range<u32>,
-        place: Option<usize>,
+        place: usize,
     ) -> Result<(), String> {
-        self.dispatch(rect, samples.clone(), groups.clone(), place, false)?;
+        self.dispatch(rect, most, groups.clone(), place)?;
         // Every dispatch reads one texture and writes the other.
-        let mut from = 1 - place.unwrap_or(0);
+        let mut from = 1 - place;
         while self.counts_trips() {
             let [unfinished, stuck] = self.tile.as_ref().ok_or("no tile")?.left(&self.gpu)?;
-            if unfinished == 0 && from == 1 - place.unwrap_or(0) {
+            if unfinished == 0 && from == 1 - place {
                 break;
             }
             if stuck > 0 {
@@ -286,35 +296,33 @@ impl GpuEngine {
                     self.gpu.trip_limit
                 ));
             }
-            self.dispatch(rect, samples.clone(), groups.clone(), Some(from), true)?;
+            self.dispatch(rect, most, groups.clone(), from)?;
             from = 1 - from;
         }
         Ok(())
     }
 
-    /// One dispatch, and waits for it; `resume` goes on with what the last one could not finish.
+    /// One dispatch, and waits for it: each pixel goes on where the last one of it ended.
     fn dispatch(
         &self,
         rect: Rect,
-        samples: Range<u64>,
+        most: u64,
         groups: Range<u32>,
-        place: Option<usize>,
-        resume: bool,
+        place: usize,
     ) -> Result<(), String> {
         let tile = self.tile.as_ref().ok_or("no tile")?;
         let all = workgroups(rect);
+        let number = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
         let params = Params {
             tile: [rect.x0, rect.y0],
             size: [rect.width(), rect.height()],
-            first: samples.start as u32,
-            end: samples.end as u32,
-            fresh: u32::from(place.is_none()),
+            pixels: number(rect.area()),
+            most: number(most),
             seed: self.seed,
             groups: all,
             first_group: groups.start,
             stride: coprime_stride(all),
-            resume: u32::from(resume),
-            trips: u32::try_from(self.gpu.trip_limit).unwrap_or(u32::MAX),
+            trips: number(self.gpu.trip_limit),
             rounds: 2,
         };
         self.gpu
@@ -329,49 +337,54 @@ impl GpuEngine {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &self.scene, &[]);
-            pass.set_bind_group(1, &tile.bind_groups[place.unwrap_or(0)], &[]);
+            pass.set_bind_group(1, &tile.bind_groups[place], &[]);
             pass.dispatch_workgroups(groups.end - groups.start, 1, 1);
         }
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.wait()
     }
 
-    /// Adds `samples` to the sums of every pixel of `rect`, in as many submissions as their cost asks for. A lane that
+    /// Does the work on the pixels of `rect`, in as many submissions as its cost asks for. A lane that
     /// takes many samples of its pixel one after another waits the least for its neighbours' longer paths, so what is
     /// cut is the picture, and the samples only where the driver's limit on loop trips is near.
     fn submit_all(
         &mut self,
         rect: Rect,
-        samples: Range<u64>,
-        place: &mut Option<usize>,
+        work: &Work,
+        place: &mut usize,
         stop: &AtomicBool,
     ) -> Result<(), EngineError> {
         let most = (self.gpu.trip_limit / self.kernel.trips_per_sample.max(1)).max(1);
-        let all = workgroups(rect);
-        let mut at = samples.start;
-        while at < samples.end {
-            let end = samples.end.min(at + most);
+        let mut done = 0;
+        while done < work.longest {
+            let paths = work.paths(done, most);
             let mut group = 0;
-            while group < all {
+            while group < paths.len() {
                 if stop.load(Ordering::Relaxed) {
                     return Err(EngineError::Stopped);
                 }
-                let paths_per_group = f64::from(WORKGROUP) * (end - at) as f64;
                 let affordable = match self.seconds_per_path {
-                    Some(cost) => (SUBMISSION_SECONDS / (cost * paths_per_group)) as u32,
-                    None => (FIRST_PATHS / paths_per_group) as u32,
+                    Some(cost) => SUBMISSION_SECONDS / cost,
+                    None => FIRST_PATHS,
                 };
-                let count = affordable.clamp(1, all - group);
+                let (mut end, mut sum) = (group + 1, paths[group] as f64);
+                while end < paths.len() && sum + paths[end] as f64 <= affordable {
+                    sum += paths[end] as f64;
+                    end += 1;
+                }
                 let start = Instant::now();
-                self.submit(rect, at..end, group..group + count, *place)
+                self.submit(rect, most, group as u32..end as u32, *place)
                     .map_err(EngineError::Device)?;
-                let cost = start.elapsed().as_secs_f64() / (f64::from(count) * paths_per_group);
-                self.seconds_per_path =
-                    Some(self.seconds_per_path.map_or(cost, |old| 0.5 * (old + cost)));
-                group += count;
+                // Where there is nothing to do its cost tells nothing.
+                if sum > 0.0 {
+                    let cost = start.elapsed().as_secs_f64() / sum;
+                    self.seconds_per_path =
+                        Some(self.seconds_per_path.map_or(cost, |old| 0.5 * (old + cost)));
+                }
+                group = end;
             }
-            *place = Some(1 - place.unwrap_or(0));
-            at = end;
+            *place = 1 - *place;
+            done += most;
         }
         Ok(())
     }
@@ -380,7 +393,7 @@ impl GpuEngine {
         &mut self,
         film: &Film,
         rect: Rect,
-        samples: Range<u64>,
+        parts: &[Part],
         stop: &AtomicBool,
     ) -> Result<Vec<[u32; 4]>, EngineError> {
         let device_error = EngineError::Device;
@@ -392,17 +405,18 @@ impl GpuEngine {
         if let Some(seen) = &self.seen {
             tile.upload_seen(&self.gpu, &seen.mark(rect));
         }
-        let mut place = None;
+        let work = Work::new(rect, parts);
+        tile.upload_ranges(&self.gpu, &work.ranges());
+        let mut place = 0;
         let held = self.held.take();
-        if !samples.start.is_multiple_of(BLOCK) {
-            place = match &held {
-                Some(held) if held.is_in(film, rect) => Some(held.place),
+        if parts.iter().any(goes_on) {
+            match &held {
+                Some(held) if held.serves(film, rect, parts) => place = held.place,
                 _ => {
                     let pixels =
                         (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
                     let running: Vec<_> = pixels.map(|(x, y)| film.partial_at(x, y)).collect();
                     tile.upload(&self.gpu, &running);
-                    Some(0)
                 }
             };
         }
@@ -415,8 +429,7 @@ impl GpuEngine {
         tile.clear_counters(&mut encoder);
         self.gpu.queue.submit([encoder.finish()]);
 
-        self.submit_all(rect, samples, &mut place, stop)?;
-        let place = place.unwrap_or(0);
+        self.submit_all(rect, &work, &mut place, stop)?;
         let tile = self
             .tile
             .as_ref()
@@ -427,7 +440,7 @@ impl GpuEngine {
             .map_err(device_error)?;
         self.read_back_seconds += begun.elapsed().as_secs_f64();
         self.held = Some(Held {
-            rect,
+            tile: rect,
             place,
             running,
         });
@@ -436,38 +449,38 @@ impl GpuEngine {
 }
 
 impl Engine for GpuEngine {
-    fn render(
+    fn render_parts(
         &mut self,
         film: &mut Film,
-        rect: Rect,
-        samples: Range<u64>,
+        tile: Rect,
+        parts: &[Part],
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError> {
-        let counted = self.render_tile(film, rect, samples.clone(), stop)?;
+        let counted = self.render_tile(film, tile, parts, stop)?;
         let begun = Instant::now();
         let held = self.held.as_ref().map_or(&[][..], |h| &h.running);
-        let mut counters = Counters {
-            paths: rect.area() * (samples.end - samples.start),
-            ..Counters::default()
-        };
-        let width = rect.width() as usize;
-        let block = samples.start / BLOCK * BLOCK;
-        for (i, c) in counted.iter().enumerate() {
-            let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
-            counters.rays += u64::from(c[0]);
-            counters.truncated += half(1, 0);
-            let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
-            if left_out != [0; REPLICATES] {
-                let (x, y) = (rect.x0 + (i % width) as u32, rect.y0 + (i / width) as u32);
-                film.leave_out(x, y, left_out);
-                counters.nonfinite += left_out.iter().sum::<u64>();
-                let first = (x, y, block + half(1, 16) - 1);
-                counters.first_nonfinite = counters.first_nonfinite.or(Some(first));
+        let width = tile.width() as usize;
+        let at = |x: u32, y: u32| (y - tile.y0) as usize * width + (x - tile.x0) as usize;
+        let mut counters = Counters::default();
+        for part in parts {
+            let Part { rect, samples } = part;
+            counters.paths += part.paths();
+            let block = samples.start / BLOCK * BLOCK;
+            for (x, y) in (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y))) {
+                let c = counted[at(x, y)];
+                let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
+                counters.rays += u64::from(c[0]);
+                counters.truncated += half(1, 0);
+                let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
+                if left_out != [0; REPLICATES] {
+                    film.leave_out(x, y, left_out);
+                    counters.nonfinite += left_out.iter().sum::<u64>();
+                    let first = (x, y, block + half(1, 16) - 1);
+                    counters.first_nonfinite = counters.first_nonfinite.or(Some(first));
+                }
             }
+            film.put_block(*rect, samples.clone(), |x, y| held[at(x, y)]);
         }
-        film.put_block(rect, samples, |x, y| {
-            held[(y - rect.y0) as usize * width + (x - rect.x0) as usize]
-        });
         self.read_back_seconds += begun.elapsed().as_secs_f64();
         Ok(counters)
     }
@@ -479,25 +492,6 @@ impl Engine for GpuEngine {
     fn device(&self) -> &DeviceInfo {
         &self.gpu.info
     }
-}
-
-/// Workgroups that cover `rect`.
-fn workgroups(rect: Rect) -> u32 {
-    (rect.area() as u32).div_ceil(WORKGROUP)
-}
-
-/// About 0.618 of `groups`, and without a common divisor with it: steps of this visit every group once.
-fn coprime_stride(groups: u32) -> u32 {
-    let gcd = |mut a: u32, mut b: u32| {
-        while b > 0 {
-            (a, b) = (b, a % b);
-        }
-        a
-    };
-    let start = (f64::from(groups) * 0.618_034) as u32;
-    (start..)
-        .find(|&s| s > 0 && gcd(s, groups) == 1)
-        .unwrap_or(1)
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod same_hits;
 mod scene;
 mod seen;
 mod tile;
+mod work;
 
 pub use adapters::{AdapterReport, Choice, Gpu, adapters};
 pub use engine::GpuEngine;

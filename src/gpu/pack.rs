@@ -64,12 +64,10 @@ pub struct Params {
     pub tile: [u32; 2],
     /// Width and height of the tile.
     pub size: [u32; 2],
-    /// Number of the first sample.
-    pub first: u32,
-    /// One past the last.
-    pub end: u32,
-    /// 1 when the running sums start at zero.
-    pub fresh: u32,
+    /// Width times height.
+    pub pixels: u32,
+    /// Samples of each pixel that the dispatch may do.
+    pub most: u32,
     /// Seed of every random number.
     pub seed: u32,
     /// Workgroups of the tile.
@@ -78,8 +76,6 @@ pub struct Params {
     pub first_group: u32,
     /// Stride through them, coprime to their number.
     pub stride: u32,
-    /// 1: goes on where the last dispatch could not finish.
-    pub resume: u32,
     /// Loop trips that an invocation may take.
     pub trips: u32,
     /// 2: rounds of a loop that tells whether the driver still lets loops go round.
@@ -346,7 +342,7 @@ mod tests {
             Material { color, kind, specular, exponent }
             DiskLight { center, radius, normal, offset, radiance, face }
             LightCluster { center, radius, power, cos_cone }
-            Params { tile, size, first, end, fresh, seed, groups, first_group, stride, resume, trips, rounds }
+            Params { tile, size, pixels, most, seed, groups, first_group, stride, trips, rounds }
         };
         // Struct declarations are all that is needed, wherever they stand.
         let mut text = String::new();

@@ -14,7 +14,7 @@ pub(super) struct Tile {
     /// Bind group k reads texture k.
     pub bind_groups: [wgpu::BindGroup; 2],
     counters: wgpu::Buffer,
-    /// What dispatches leave to later ones, where kernels count their loop trips.
+    /// What is left to do, as `Left` in `shaders/path.wgsl` says.
     left: wgpu::Buffer,
     staging: wgpu::Buffer,
 }
@@ -42,7 +42,7 @@ impl Tile {
         layout: &wgpu::BindGroupLayout,
         params: &wgpu::Buffer,
         size: [u32; 2],
-        counts_trips: bool,
+        marks_seen: bool,
     ) -> Self {
         let texture = || {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -70,10 +70,10 @@ impl Tile {
             mapped_at_creation: false,
         });
         let pixels = u64::from(size[0]) * u64::from(size[1]);
-        let nexts = if counts_trips { 2 * pixels } else { 1 };
+        let numbers = if marks_seen { 3 } else { 2 } * pixels;
         let left = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("left"),
-            size: LEFT_HEAD + 4 * nexts,
+            size: LEFT_HEAD + 4 * numbers,
             usage: wgpu::BufferUsages::STORAGE
                 | wgpu::BufferUsages::COPY_SRC
                 | wgpu::BufferUsages::COPY_DST,
@@ -130,19 +130,26 @@ impl Tile {
         }
     }
 
+    /// Says which samples each pixel is to have: see [`Work::ranges`](super::work::Work::ranges).
+    pub fn upload_ranges(&self, gpu: &Gpu, ranges: &[u32]) {
+        gpu.queue
+            .write_buffer(&self.left, LEFT_HEAD, bytemuck::cast_slice(ranges));
+    }
+
     /// Says which pixels, rows of the tile, may see a light.
     pub fn upload_seen(&self, gpu: &Gpu, seen: &[u32]) {
-        let at = LEFT_HEAD + 4 * seen.len() as u64;
+        let at = LEFT_HEAD + 2 * 4 * seen.len() as u64;
         gpu.queue
             .write_buffer(&self.left, at, bytemuck::cast_slice(seen));
     }
 
-    /// Nothing is left, before a dispatch.
+    /// No pixel is unfinished, before a dispatch.
     pub fn clear_left(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.clear_buffer(&self.left, 0, Some(LEFT_HEAD));
     }
 
-    /// How many pixels have samples left to do, and 1 + the number of one of which not even one could be finished.
+    /// Of how many pixels the last dispatch could not do its samples, and 1 + the number of one of which not even one could be
+    /// finished.
     pub fn left(&self, gpu: &Gpu) -> Result<[u32; 2], String> {
         let mut encoder = gpu
             .device

@@ -28,7 +28,7 @@ mod chi_square;
 pub use sampler::Sampler;
 pub use tracer::{Hit, Met, Ray, Tracer};
 
-use crate::engine::{Counters, DeviceInfo, Engine, EngineError};
+use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::coverage::Rect;
 use crate::film::{Film, REPLICATES, Sums};
 use crate::settings::Settings;
@@ -122,31 +122,37 @@ struct Pixel {
 }
 
 impl Engine for CpuEngine {
-    fn render(
+    fn render_parts(
         &mut self,
         film: &mut Film,
-        rect: Rect,
-        samples: Range<u64>,
+        _: Rect,
+        parts: &[Part],
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError> {
         let before = &*film;
-        let pixels: Option<Vec<_>> = (0..rect.area())
-            .into_par_iter()
-            .map(|k| {
-                let width = u64::from(rect.width());
-                let x = rect.x0 + (k % width) as u32;
-                let y = rect.y0 + (k / width) as u32;
-                let sums = before.sums()[before.index(x, y)];
-                self.render_pixel([x, y], samples.clone(), sums, stop)
-            })
-            .collect();
-        let pixels = pixels.ok_or(EngineError::Stopped)?;
-        film.put_samples(rect, samples, pixels.iter().map(|p| p.sums).collect());
+        let render = |part: &Part| -> Option<Vec<Pixel>> {
+            let rect = part.rect;
+            (0..rect.area())
+                .into_par_iter()
+                .map(|k| {
+                    let width = u64::from(rect.width());
+                    let x = rect.x0 + (k % width) as u32;
+                    let y = rect.y0 + (k / width) as u32;
+                    let sums = before.sums()[before.index(x, y)];
+                    self.render_pixel([x, y], part.samples.clone(), sums, stop)
+                })
+                .collect()
+        };
+        let all: Option<Vec<_>> = parts.iter().map(render).collect();
         let mut total = Counters::default();
-        for (k, pixel) in (0..).zip(pixels) {
-            let (x, y) = (rect.x0 + k % rect.width(), rect.y0 + k / rect.width());
-            film.leave_out(x, y, pixel.left_out);
-            total += pixel.counters;
+        for (Part { rect, samples }, pixels) in parts.iter().zip(all.ok_or(EngineError::Stopped)?) {
+            let sums = pixels.iter().map(|p| p.sums).collect();
+            film.put_samples(*rect, samples.clone(), sums);
+            for (k, pixel) in (0..).zip(pixels) {
+                let (x, y) = (rect.x0 + k % rect.width(), rect.y0 + k / rect.width());
+                film.leave_out(x, y, pixel.left_out);
+                total += pixel.counters;
+            }
         }
         Ok(total)
     }

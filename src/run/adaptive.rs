@@ -5,8 +5,8 @@
 //! in between lies on a straight line. So a tile's samples depend on the mean that was reached, and not
 //! on how it was.
 
-use super::{Run, StopReason, next_check};
-use crate::engine::EngineError;
+use super::{Run, StopReason, next_check, paths};
+use crate::engine::{EngineError, Part};
 use crate::film::coverage::Rect;
 use crate::film::pilot::Pilot;
 use crate::film::{BLOCK, Film, REPLICATES};
@@ -84,7 +84,7 @@ impl Run<'_> {
         let tiles = pilot.tiles();
         self.film.coverage.split(&tiles);
         let mut mean = 0;
-        loop {
+        'waves: loop {
             let check = self.next_check(mean);
             let goal = check.min(job.samples.end);
             while let Some(stage) = self.lacks_pilot(check) {
@@ -98,30 +98,32 @@ impl Run<'_> {
             }
             let mut next = goal;
             let mut wanted = self.counts(&tiles, goal);
-            let mut calls = self.calls(&tiles, &wanted);
-            if !calls.is_empty() {
+            if !self.has_just(&tiles, &wanted) {
                 next = self.affordable(mean, goal);
-                if next < goal {
-                    wanted = self.counts(&tiles, next);
-                    calls = self.calls(&tiles, &wanted);
-                }
+                wanted = self.counts(&tiles, next);
             }
-            for (rect, samples) in calls {
-                let mut at = samples.start;
-                while at < samples.end {
-                    let part = at..self.part_end(rect, at, samples.end);
+            let learning = self.pace.is_none();
+            for &tile in &job.tiles {
+                loop {
+                    let parts = self.in_time(self.lacking(tile, &tiles, &wanted));
+                    if parts.is_empty() {
+                        break;
+                    }
                     if self.stop.load(Ordering::Relaxed) {
                         return Ok(StopReason::Interrupted);
                     }
-                    if self.too_late(rect, &part) {
+                    if self.too_late(&parts) {
                         return Ok(StopReason::Time);
                     }
-                    at = part.end;
-                    if !self.call(rect, part)? {
+                    if !self.call(tile, &parts)? {
                         return Ok(StopReason::Interrupted);
                     }
                     self.tally.forecast = self.forecast();
                     after(self.film, &self.tally)?;
+                    // One call tells the pace; all others are of the right length.
+                    if learning {
+                        continue 'waves;
+                    }
                 }
             }
             mean = next;
@@ -134,15 +136,18 @@ impl Run<'_> {
         }
     }
 
-    /// The next mean at which the error may be looked at. Where that ends no run, some are passed over once there are tiles
-    /// to be called one by one: a call for few samples of a tile costs a tenth more than it must.
+    /// The next mean at which the error may be looked at. Where that ends no run some are passed over: the more samples a
+    /// call has for each pixel, the less it costs.
     fn next_check(&self, mean: u64) -> u64 {
-        let mut check = next_check(mean, self.job.round);
-        while self.job.error.is_none()
-            && mean >= even(self.job.round)
-            && next_check(check, self.job.round) <= 4 * mean
-        {
-            check = next_check(check, self.job.round);
+        let round = self.job.round;
+        let mut check = next_check(mean, round);
+        let far = if mean < even(round) {
+            even(round)
+        } else {
+            4 * mean
+        };
+        while self.job.error.is_none() && next_check(check, round) <= far {
+            check = next_check(check, round);
         }
         check
     }
@@ -193,7 +198,11 @@ impl Run<'_> {
             let mut at = samples.start;
             while at < samples.end {
                 let end = samples.end.min((at / BLOCK + 1) * BLOCK);
-                done = self.call_on(Some(&mut piece), *tile, at..end);
+                let part = Part {
+                    rect: *tile,
+                    samples: at..end,
+                };
+                done = self.call_on(Some(&mut piece), *tile, &[part]);
                 if !matches!(done, Ok(true)) {
                     break 'tiles;
                 }
@@ -208,18 +217,33 @@ impl Run<'_> {
         done
     }
 
-    /// What is missing for the tiles to have their samples, each call for a rectangle of as many tiles as lack the same.
-    fn calls(&self, tiles: &[Rect], wanted: &[u64]) -> Vec<(Rect, Range<u64>)> {
-        let mut calls = Vec::new();
-        for (tile, &n) in tiles.iter().zip(wanted) {
-            for (rect, ranges) in self.film.coverage.missing(*tile, 0..n) {
-                calls.extend(ranges.into_iter().map(|r| (rect, r)));
+    /// What pixels of the job's tile `tile` lack next of their samples, each up to the end of a block.
+    fn lacking(&self, tile: Rect, tiles: &[Rect], wanted: &[u64]) -> Vec<Part> {
+        let here = tiles.iter().zip(wanted);
+        let here = here.filter_map(|(t, &n)| Some((t.intersection(&tile)?, n)));
+        let missing = here.flat_map(|(t, n)| self.film.coverage.missing(t, 0..n));
+        let next = missing.filter_map(|(rect, ranges)| {
+            let all = ranges.into_iter().next()?;
+            let block_end = (all.start / BLOCK + 1) * BLOCK;
+            let samples = all.start..all.end.min(block_end);
+            Some(Part { rect, samples })
+        });
+        next.filter(|p| p.paths() > 0).collect()
+    }
+
+    /// What of these parts a call can do in time: of each the same share, but one sample at least.
+    fn in_time(&self, mut parts: Vec<Part>) -> Vec<Part> {
+        let share = match self.pace {
+            Some(pace) => self.job.call.as_secs_f64() / (pace * paths(&parts)),
+            None => 0.0,
+        };
+        if share < 1.0 {
+            for Part { samples, .. } in &mut parts {
+                let fits = (samples.end - samples.start) as f64 * share;
+                samples.end = samples.start + (fits as u64).max(1);
             }
         }
-        let mut calls = joined(calls, self.widest);
-        // Rectangles of one size follow each other: an engine keeps what it has for them.
-        calls.sort_by_key(|(r, s)| (r.width(), r.height(), r.y0, r.x0, s.start));
-        calls
+        parts
     }
 
     /// The largest mean up to `goal` that the time allows.
@@ -237,16 +261,6 @@ impl Run<'_> {
         goal.min((reached as u64).max(mean + 1))
     }
 
-    /// Where a call that starts at `at` ends: at the end of its block, or of what it can do in time.
-    fn part_end(&self, rect: Rect, at: u64, end: u64) -> u64 {
-        let fits = match self.pace {
-            Some(pace) => self.job.call.as_secs_f64() / (pace * rect.area() as f64),
-            None => 1.0,
-        };
-        end.min((at / BLOCK + 1) * BLOCK)
-            .min(at + (fits as u64).max(1))
-    }
-
     /// Whether the tiles have these samples and no more.
     fn has_just(&self, tiles: &[Rect], wanted: &[u64]) -> bool {
         let all = tiles
@@ -255,40 +269,4 @@ impl Run<'_> {
             .map(|(t, &n)| u128::from(t.area()) * u128::from(n));
         self.film.coverage.total() == all.sum::<u128>()
     }
-}
-
-/// The longer side.
-fn longest_side(r: &Rect) -> u32 {
-    r.width().max(r.height())
-}
-
-/// Joins rectangles beside and below each other that lack the same samples, up to `most` pixels.
-fn joined(mut calls: Vec<(Rect, Range<u64>)>, most: u64) -> Vec<(Rect, Range<u64>)> {
-    let mut join = |key: fn(&Rect) -> [u32; 4], fits: fn(&Rect, &Rect) -> bool| {
-        calls.sort_by_key(|(r, s)| (s.start, s.end, key(r)));
-        let mut out: Vec<(Rect, Range<u64>)> = Vec::new();
-        for (rect, samples) in calls.drain(..) {
-            match out.last_mut() {
-                Some((last, same))
-                    if *same == samples
-                        && fits(last, &rect)
-                        && last.area() + rect.area() <= most
-                        && longest_side(&last.union(&rect)) <= super::MAX_TILE_SIDE =>
-                {
-                    *last = last.union(&rect);
-                }
-                _ => out.push((rect, samples)),
-            }
-        }
-        calls = out;
-    };
-    join(
-        |r| [r.y0, r.y1, r.x0, r.x1],
-        |a, b| (a.y0, a.y1, a.x1) == (b.y0, b.y1, b.x0),
-    );
-    join(
-        |r| [r.x0, r.x1, r.y0, r.y1],
-        |a, b| (a.x0, a.x1, a.y1) == (b.x0, b.x1, b.y0),
-    );
-    calls
 }

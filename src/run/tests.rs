@@ -7,7 +7,7 @@ use crate::film::Sums;
 /// An engine whose pixels are noise that depends on pixel and sample number alone; notes its calls.
 struct Fake {
     device: DeviceInfo,
-    calls: Vec<(Rect, Range<u64>)>,
+    calls: Vec<Vec<Part>>,
     nap: Duration,
     fail_at: Option<usize>,
     seed: u32,
@@ -33,33 +33,9 @@ impl Fake {
             value: |h| (h >> 40) as f64 / (1u64 << 24) as f64,
         }
     }
-}
 
-/// Bits from a seed, a pixel and a sample.
-fn noise(seed: u32, x: u32, y: u32, s: u64) -> u64 {
-    let h = (u64::from(x) << 40 ^ u64::from(y) << 20 ^ s).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let h = (h ^ (h >> 29)).wrapping_add(u64::from(seed).wrapping_mul(0x94d0_49bb_1331_11eb));
-    let h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb)
-}
-
-impl Engine for Fake {
-    fn render(
-        &mut self,
-        film: &mut Film,
-        rect: Rect,
-        samples: Range<u64>,
-        stop: &AtomicBool,
-    ) -> Result<Counters, EngineError> {
-        assert!(rect.area() <= MAX_TILE_PIXELS);
-        assert!(film.coverage.overlap(rect, &samples).is_none());
-        if stop.load(Ordering::Relaxed) {
-            return Err(EngineError::Stopped);
-        }
-        if self.fail_at == Some(self.calls.len()) {
-            return Err(EngineError::Device("lost".into()));
-        }
-        std::thread::sleep(self.nap);
+    /// Adds samples to a film.
+    fn add(&self, film: &mut Film, rect: Rect, samples: Range<u64>) {
         let round = u64::from(film.strata * film.strata);
         film.put_block(rect, samples.clone(), |_, _| [[0.0; 4]; REPLICATES]);
         let pixels = (rect.y0..rect.y1)
@@ -75,11 +51,55 @@ impl Engine for Fake {
             });
         let (pixels, coverage) = (pixels.collect::<Vec<_>>(), film.coverage.clone());
         film.coverage = Coverage::default();
-        film.put_samples(rect, samples.clone(), pixels);
+        film.put_samples(rect, samples, pixels);
         film.coverage = coverage;
-        self.calls.push((rect, samples.clone()));
+    }
+
+    /// Paths of all calls.
+    fn paths(&self) -> u64 {
+        self.calls.iter().flatten().map(Part::paths).sum()
+    }
+}
+
+/// Bits from a seed, a pixel and a sample.
+fn noise(seed: u32, x: u32, y: u32, s: u64) -> u64 {
+    let h = (u64::from(x) << 40 ^ u64::from(y) << 20 ^ s).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let h = (h ^ (h >> 29)).wrapping_add(u64::from(seed).wrapping_mul(0x94d0_49bb_1331_11eb));
+    let h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb)
+}
+
+impl Engine for Fake {
+    fn render_parts(
+        &mut self,
+        film: &mut Film,
+        tile: Rect,
+        parts: &[Part],
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError> {
+        assert!(tile.area() <= MAX_TILE_PIXELS && !parts.is_empty());
+        let rects: Vec<Rect> = parts.iter().map(|p| p.rect).collect();
+        let area: u64 = rects.iter().map(Rect::area).sum();
+        let apart: u64 = Rect::disjoint(&rects).iter().map(Rect::area).sum();
+        assert_eq!(area, apart, "parts overlap");
+        for Part { rect, samples } in parts {
+            assert_eq!(rect.intersection(&tile), Some(*rect));
+            assert_eq!(samples.start / BLOCK, (samples.end - 1) / BLOCK);
+            assert!(film.coverage.overlap(*rect, samples).is_none());
+        }
+        if stop.load(Ordering::Relaxed) {
+            return Err(EngineError::Stopped);
+        }
+        if self.fail_at == Some(self.calls.len()) {
+            return Err(EngineError::Device("lost".into()));
+        }
+        std::thread::sleep(self.nap);
+        for part in parts {
+            self.add(film, part.rect, part.samples.clone());
+        }
+        self.calls.push(parts.to_vec());
         Ok(Counters {
-            paths: rect.area() * (samples.end - samples.start),
+            paths: parts.iter().map(Part::paths).sum(),
             ..Counters::default()
         })
     }
@@ -151,11 +171,17 @@ fn passes_cover_the_job_and_stay_in_their_block() {
     let mut engine = Fake::new();
     assert_eq!(run(&job, &mut engine, &mut film), StopReason::Samples);
     assert_eq!(film.coverage.samples(), (700, 700));
-    assert_eq!(engine.calls[0].1, 0..1);
-    for (_, s) in &engine.calls {
+    assert_eq!(engine.calls[0][0].samples, 0..1);
+    for Part { samples: s, .. } in engine.calls.iter().flatten() {
         assert_eq!(s.start / BLOCK, (s.end - 1) / BLOCK, "{s:?}");
     }
-    assert!(engine.calls.iter().any(|(_, s)| s.end - s.start >= 64));
+    assert!(
+        engine
+            .calls
+            .iter()
+            .flatten()
+            .any(|p| p.samples.end - p.samples.start >= 64)
+    );
 }
 
 #[test]
@@ -165,12 +191,7 @@ fn resuming_does_only_what_is_missing() {
     run(&job(size, 14, 40..50), &mut Fake::new(), &mut film);
     let mut engine = Fake::new();
     run(&job(size, 21, 0..100), &mut engine, &mut film);
-    let paths: u64 = engine
-        .calls
-        .iter()
-        .map(|(r, s)| r.area() * (s.end - s.start))
-        .sum();
-    assert_eq!(paths, 35 * 90);
+    assert_eq!(engine.paths(), 35 * 90);
     assert_eq!(film.coverage.samples(), (100, 100));
     let mut again = Fake::new();
     assert_eq!(
@@ -416,4 +437,21 @@ fn an_adaptive_forecast_grows_to_its_end() {
     assert!(fractions.windows(2).all(|f| f[0] <= f[1]));
     let last = fractions.pop().unwrap();
     assert!(last > 0.99 && fractions[0] < 0.1, "{last}");
+}
+
+/// All tiles are called at once, each for the samples that it lacks.
+#[test]
+fn an_adaptive_wave_is_a_few_large_calls() {
+    let size = [80, 48];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let mut job = job(size, 2000, 0..150);
+    job.adaptive = Some(5);
+    let mut engine = Fake::new();
+    // No two tiles find the same.
+    engine.value = |h| if (h >> 32) % 1000 == 0 { 1000.0 } else { 0.0 };
+    assert_eq!(run(&job, &mut engine, &mut film), StopReason::Samples);
+    // Two bands, and for each: the first samples, the others before the pilot, the pilot, two waves and a second block.
+    assert!(engine.calls.len() <= 14, "{} calls", engine.calls.len());
+    let differ = |parts: &Vec<Part>| parts.iter().any(|p| p.samples != parts[0].samples);
+    assert!(engine.calls.iter().any(differ));
 }

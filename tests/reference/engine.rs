@@ -1,7 +1,7 @@
 //! The engine around the paths: what is on the film does not depend on how the work was cut.
 
 use crate::build::*;
-use etendue::engine::{Counters, Engine, EngineError};
+use etendue::engine::{Counters, Engine, EngineError, Part};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
 use etendue::reference::{CpuEngine, Estimator};
@@ -60,6 +60,27 @@ fn regions_and_ranges_give_the_bits_of_the_whole() {
         whole.sums().iter().any(|s| s[0] != s[1]),
         "replicates differ"
     );
+}
+
+#[test]
+fn parts_have_samples_of_their_own() {
+    let tile = Rect::whole([8, 6]);
+    let left = Rect { x1: 3, ..tile };
+    let below = Rect {
+        x0: 3,
+        y0: 4,
+        ..tile
+    };
+    let parts = [(left, 0..9), (below, 0..14)].map(|(rect, samples)| Part { rect, samples });
+    let (mut once, mut apart) = (empty_film(), empty_film());
+    let counters = engine().render_parts(&mut once, tile, &parts, &GO_ON);
+    let mut total = Counters::default();
+    for Part { rect, samples } in parts {
+        total += engine().render(&mut apart, rect, samples, &GO_ON).unwrap();
+    }
+    assert_eq!(once, apart);
+    assert_eq!(counters, Ok(total));
+    assert_eq!(total.paths, 18 * 9 + 10 * 14);
 }
 
 #[test]

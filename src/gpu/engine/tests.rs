@@ -62,18 +62,6 @@ fn a_tile_that_no_texture_holds_is_an_error() {
 }
 
 #[test]
-fn strides_visit_every_group() {
-    for groups in [1, 2, 3, 7, 64, 3072, 16384] {
-        let stride = coprime_stride(groups);
-        let mut seen = vec![false; groups as usize];
-        for g in 0..groups {
-            seen[(u64::from(g) * u64::from(stride) % u64::from(groups)) as usize] = true;
-        }
-        assert!(seen.iter().all(|s| *s), "{groups} groups, stride {stride}");
-    }
-}
-
-#[test]
 fn samples_that_are_not_finite_are_left_out_and_counted_by_replicate() {
     let add = "let l = path.radiance;";
     // One in every replicate's first round but the last's: samples 1, 5 and 9, and the same 256 later.
@@ -141,4 +129,134 @@ fn a_path_that_cannot_be_cut_is_refused_and_named() {
             .contains("takes more than 300 loop trips"),
         "{refused}"
     );
+}
+
+const TILE: Rect = Rect {
+    x0: 0,
+    y0: 0,
+    x1: 16,
+    y1: 12,
+};
+
+/// Engines for 16 x 12 pixels of one scene with each way to reach its values. A few samples, or one path in trees, use up the
+/// loop trips if they are `scant`.
+fn engines(scant: bool) -> Vec<GpuEngine> {
+    let text = include_str!("../../../scenes/three_materials.toml");
+    let scene = parse::parse_str("three.toml".as_ref(), text).expect("a scene");
+    let flags = Overrides {
+        size: Some([TILE.x1, TILE.y1]),
+        ..Overrides::default()
+    };
+    let settings = Settings::resolve(&scene, &flags);
+    let world = World::new(&scene, settings.size);
+    let engine = |access| {
+        let mut gpu = Gpu::open(&Choice::default()).expect("an adapter");
+        if scant {
+            gpu.trip_limit = match compose(&world, &settings, Some(access)).trips_per_sample {
+                0 => 4_000,
+                trips => 7 * trips + 1,
+            };
+        }
+        GpuEngine::on(gpu, &world, &settings, Some(access)).expect("an engine")
+    };
+    [Access::Baked, Access::Buffers, Access::Tree]
+        .map(engine)
+        .into()
+}
+
+/// Parts of [`TILE`], as (which of three rectangles that are all of it, samples).
+fn parts(of: &[(usize, Range<u64>)]) -> Vec<Part> {
+    let rects = [
+        Rect { x1: 7, ..TILE },
+        Rect {
+            x0: 7,
+            y1: 5,
+            ..TILE
+        },
+        Rect {
+            x0: 7,
+            y0: 5,
+            ..TILE
+        },
+    ];
+    let part = |(k, samples): &(usize, Range<u64>)| Part {
+        rect: rects[*k],
+        samples: samples.clone(),
+    };
+    of.iter().map(part).collect()
+}
+
+#[test]
+fn a_call_with_several_parts_gives_the_bits_of_separate_calls() {
+    let calls = [
+        parts(&[(0, 0..40), (1, 0..256)]),
+        parts(&[(0, 40..47), (1, 256..300), (2, 0..3)]),
+        parts(&[(0, 47..256)]),
+        parts(&[(2, 3..256), (1, 300..310)]),
+    ];
+    let alone = parts(&[(0, 0..256), (1, 0..256), (1, 256..310), (2, 0..256)]);
+    let stop = AtomicBool::new(false);
+    let mut scant = engines(true);
+    for (mut engine, scant) in engines(false).into_iter().zip(&mut scant) {
+        let access = engine.kernel().access;
+        let mut wanted = Film::new([16, 12], TILE, 2);
+        let mut counted = Counters::default();
+        for Part { rect, samples } in &alone {
+            let one = engine.render(&mut wanted, *rect, samples.clone(), &stop);
+            counted += one.expect("samples");
+        }
+        // What is in the textures serves the next call; or it has gone, and comes from the film.
+        for forget in [false, true] {
+            for engine in [&mut engine, &mut *scant] {
+                let mut film = Film::new([16, 12], TILE, 2);
+                let mut total = Counters::default();
+                for parts in &calls {
+                    if forget {
+                        engine.held = None;
+                    }
+                    let some = engine.render_parts(&mut film, TILE, parts, &stop);
+                    total += some.expect("samples");
+                }
+                assert!(film.sums() == wanted.sums(), "{access:?}");
+                assert!(film.partial() == wanted.partial(), "{access:?}");
+                assert_eq!(film.coverage.total(), wanted.coverage.total());
+                assert_eq!(total, counted, "{access:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_call_that_is_stopped_on_its_way_leaves_the_film_and_the_next_one_its_bits() {
+    for mut engine in engines(false) {
+        let stop = AtomicBool::new(false);
+        let first = parts(&[(0, 0..100), (1, 0..30)]);
+        let then = parts(&[(0, 100..256), (1, 30..256), (2, 0..256)]);
+        let mut wanted = Film::new([16, 12], TILE, 2);
+        for parts in [&first, &then] {
+            let some = engine.render_parts(&mut wanted, TILE, parts, &stop);
+            some.expect("samples");
+        }
+        let mut film = Film::new([16, 12], TILE, 2);
+        engine
+            .render_parts(&mut film, TILE, &first, &stop)
+            .expect("samples");
+        let before = film.clone();
+        // What a call has done that is stopped after its first submission.
+        let work = Work::new(TILE, &then);
+        let tile = engine.tile.as_ref().expect("a tile");
+        tile.upload_ranges(&engine.gpu, &work.ranges());
+        engine
+            .submit(TILE, work.longest, 0..1, 1)
+            .expect("a submission");
+        stop.store(true, Ordering::Relaxed);
+        let stopped = engine.render_parts(&mut film, TILE, &then, &stop);
+        assert_eq!(stopped, Err(EngineError::Stopped));
+        assert_eq!(film, before);
+        stop.store(false, Ordering::Relaxed);
+        engine
+            .render_parts(&mut film, TILE, &then, &stop)
+            .expect("samples");
+        assert_eq!(film, wanted);
+    }
 }
