@@ -11,11 +11,11 @@ const BY_MIRROR: u32 = 0x40000000u;
 const SENT: u32 = 0x80000000u;
 const SENT_AND_MET: u32 = 0xc0000000u;
 const ASTRAY: u32 = 0xffffffffu;
-// The mirror's number, below the light's.
+// The mirror's number, in the lowest bits, and the light's above it.
 const MIRROR_BITS: u32 = 15u;
 const MIRROR_MASK: u32 = 0x7fffu;
 
-// Turns of the path loop for one in which paths are sent: of 2 to 16 the fastest.
+// Turns of the path loop for one in which paths are sent. 8 and 12 were as fast, 2, 4, 6 and 16 slower.
 const TURNS: u32 = 8u;
 
 // Where the ball is met at less than this cosine its light is left to chance. There the image is so narrow that it holds next

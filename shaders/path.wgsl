@@ -263,10 +263,10 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances_left));
         }
 #if IMAGES
+    } // Turns; their lines stand as in kernels without this loop.
+    if path.sends {
+        send(&path);
     }
-        if path.sends {
-            send(&path);
-        }
 #endif
     }
     left.next[index] = s;

@@ -103,7 +103,7 @@ impl LightTree {
 
 /// By how much the channels of a light count when one is chosen: half by luminance, half alike. By luminance alone a blue
 /// light is so rarely chosen that blue is almost all of the error of a picture, and alike for all the luminance suffers.
-const LIGHT_COLORS: DVec3 = DVec3::new(0.273, 0.5243, 0.2027);
+pub(super) const LIGHT_COLORS: DVec3 = DVec3::new(0.273, 0.5243, 0.2027);
 
 /// What a light sends out, up to a factor.
 fn power(l: &WorldLight) -> f64 {

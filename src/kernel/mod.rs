@@ -1,6 +1,7 @@
 //! The kernel made for one scene: the modules of `shaders/` that it needs, constants, and the generated
 //! functions that meet its primitives and choose its lights.
 
+mod choice;
 mod images;
 pub(crate) mod lights;
 mod literal;
@@ -226,8 +227,8 @@ fn scene_text(
     }
     s.push_str("\n// ---- this scene\n\n");
     s.push_str(&rays::generate(world, access, features));
-    let images = images::of(world, settings, access);
-    if !images.is_empty() {
+    if features.contains("IMAGES") {
+        let images = images::of(world, settings, access);
         s.push_str(&images::generate(world, &images));
     }
     s
@@ -355,11 +356,11 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
         sampling && access == Access::Tree && records::clustered(world),
     );
     set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
-    let images = images::of(world, settings, access);
-    set("IMAGES", !images.is_empty());
+    let images = !images::of(world, settings, access).is_empty();
+    set("IMAGES", images);
     set(
         "LIGHT_WEIGHTS",
-        !images.is_empty() || sampling && world.lights.len() > 1,
+        images || sampling && world.lights.len() > 1,
     );
     set(
         "EXTREME_LIGHTS",

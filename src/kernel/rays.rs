@@ -2,7 +2,7 @@
 
 use super::literal::{float, vector};
 use super::trees::{self, Parted};
-use super::{Access, lights, select::BAKED_LIMIT, tables};
+use super::{Access, choice, lights, select::BAKED_LIMIT, tables};
 use crate::world::{Bounds, COINCIDENT, Geometry, Side, Tree, World, WorldLight, WorldPrimitive};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -49,10 +49,10 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
         }
         s.push_str("    return hit.key != NONE;\n}\n\n");
         if features.contains("LIGHT_TREE") {
-            s.push_str(CHOSEN);
+            s.push_str(choice::CHOSEN);
             s.push_str(&lights::constants(world));
         } else {
-            s.push_str(&light_choice(world, access, features));
+            s.push_str(&choice::generate(world, access, features));
         }
     }
     s.push('\n');
@@ -368,18 +368,6 @@ fn light_in_cylinder(
         && out <= radius + slack
 }
 
-pub(super) fn light_literal(l: &WorldLight) -> String {
-    format!(
-        "DiskLight({}, {}, {}, {}, {}, {}u)",
-        vector(l.center),
-        float(l.radius),
-        vector(l.normal),
-        float(l.offset),
-        vector(l.radiance),
-        l.face
-    )
-}
-
 /// Whether two lights share a plane and some of it, where the first in the file hides the others.
 pub(super) fn lights_overlap(world: &World) -> bool {
     let boxes: Vec<Bounds> = world
@@ -415,89 +403,3 @@ const HIDDEN: &str = "\
         }
     }
 ";
-
-const CHOSEN: &str = "\
-struct Chosen {
-    light: DiskLight,
-    index: u32,
-    cap: Cap,
-    // 1 / probability of this light among all, and the sum of all weights.
-    inverse_probability: f32,
-    weights: f32,
-}
-
-";
-
-/// Chooses one light with probability in proportion to its weight.
-fn light_choice(world: &World, access: Access, features: &BTreeSet<&str>) -> String {
-    let mut s = String::from(CHOSEN);
-    s.push_str("fn choose_light(p: vec3f, n: vec3f, u: f32) -> Chosen {\n");
-    if let [only] = world.lights.as_slice() {
-        let _ = writeln!(s, "    let light = {};", light_literal(only));
-        // Images are chosen against the light's own weight.
-        let weight = match features.contains("LIGHT_WEIGHTS") {
-            true => "light_weight(light, p, n)",
-            false => "1.0",
-        };
-        let _ = writeln!(
-            s,
-            "    return Chosen(light, 0u, cap_of(light, p), 1.0, {weight});\n}}"
-        );
-        return s;
-    }
-    // With trees, lights too few for a tree of their own are chosen as in a small scene.
-    match access {
-        Access::Baked | Access::Tree => {
-            // All weights stay in registers; the first partial sum above u times the whole chooses.
-            for (i, l) in world.lights.iter().enumerate() {
-                let _ = writeln!(s, "    let light_{i} = {};", light_literal(l));
-                let _ = writeln!(s, "    let w_{i} = light_weight(light_{i}, p, n);");
-                let before = if i == 0 {
-                    String::new()
-                } else {
-                    format!("sum_{} + ", i - 1)
-                };
-                let _ = writeln!(s, "    let sum_{i} = {before}w_{i};");
-            }
-            let last = world.lights.len() - 1;
-            let _ = writeln!(
-                s,
-                "    let sum = sum_{last};\n    let at = u * sum;\n    var index = 0u;\n    var chosen = w_0;"
-            );
-            for i in 1..=last {
-                let _ = writeln!(s, "    index = select(index, {i}u, at >= sum_{});", i - 1);
-                let _ = writeln!(
-                    s,
-                    "    chosen = select(chosen, w_{i}, at >= sum_{});",
-                    i - 1
-                );
-            }
-        }
-        Access::Buffers => {
-            // One pass: each light replaces the choice with its share of the sum so far, and the random number is
-            // stretched to be used again.
-            let _ = write!(
-                s,
-                "    var index = 0u;
-    var chosen = 0.0;
-    var sum = 0.0;
-    var v = u;
-    for (var i = 0u; i < {}u; i++) {{
-        let light = lights[i];
-        let w = light_weight(light, p, n);
-        sum += w;
-        let share = w / select(sum, 1.0, sum <= 0.0);
-        let take = v < share;
-        v = select((v - share) / fmax(1.0 - share, TINY), v / fmax(share, TINY), take);
-        index = select(index, i, take);
-        chosen = select(chosen, w, take);
-    }}
-",
-                world.lights.len()
-            );
-        }
-    }
-    s.push_str("    let light = light_at(index);\n");
-    s.push_str("    return Chosen(light, index, cap_of(light, p), select(sum / fmax(chosen, TINY), 0.0, chosen <= 0.0), sum);\n}\n");
-    s
-}
