@@ -20,6 +20,7 @@ use crate::stats::luminance;
 use coverage::{Coverage, Rect};
 pub use left_out::LeftOut;
 use pilot::Pilot;
+use rayon::prelude::*;
 use std::mem::take;
 use std::ops::Range;
 
@@ -138,7 +139,7 @@ impl Film {
         &mut self,
         rect: Rect,
         samples: Range<u64>,
-        running: impl Fn(u32, u32) -> [Sums<f32>; REPLICATES],
+        running: impl Fn(u32, u32) -> [Sums<f32>; REPLICATES] + Sync,
     ) {
         assert!(
             samples.start < samples.end && samples.start / BLOCK == (samples.end - 1) / BLOCK,
@@ -149,23 +150,38 @@ impl Film {
         if !ends && self.partial.is_empty() {
             self.partial = vec![Default::default(); self.sums.len()];
         }
-        for y in rect.y0..rect.y1 {
-            for x in rect.x0..rect.x1 {
-                let i = self.index(x, y);
-                let new = running(x, y);
-                if fresh && !self.partial.is_empty() {
-                    // What is there belongs to another block.
-                    fold(&mut self.sums[i], &take(&mut self.partial[i]));
+        let (bounds, columns) = (self.bounds, rect.x0..rect.x1);
+        let width = bounds.width() as usize;
+        let rows = (rect.y0 - bounds.y0) as usize * width..(rect.y1 - bounds.y0) as usize * width;
+        let across =
+            (columns.start - bounds.x0) as usize..(columns.end - bounds.x0) as usize;
+        // A fast GPU makes a block in less time than one thread takes to fold it.
+        let sums = self.sums[rows.clone()].par_chunks_mut(width);
+        let of_row = |y: usize| columns.clone().map(move |x| (x, rect.y0 + y as u32));
+        if self.partial.is_empty() {
+            sums.enumerate().for_each(|(y, sums)| {
+                for (sums, (x, y)) in sums[across.clone()].iter_mut().zip(of_row(y)) {
+                    fold(sums, &running(x, y));
                 }
-                if ends {
-                    fold(&mut self.sums[i], &new);
-                    if !self.partial.is_empty() {
-                        self.partial[i] = Default::default();
+            });
+        } else {
+            let partial = self.partial[rows].par_chunks_mut(width);
+            (sums.zip(partial).enumerate()).for_each(|(y, (sums, partial))| {
+                let pixels = sums[across.clone()].iter_mut().zip(&mut partial[across.clone()]);
+                for ((sums, partial), (x, y)) in pixels.zip(of_row(y)) {
+                    let new = running(x, y);
+                    if fresh {
+                        // What is there belongs to another block.
+                        fold(sums, &take(partial));
                     }
-                } else {
-                    self.partial[i] = new;
+                    if ends {
+                        fold(sums, &new);
+                        *partial = Default::default();
+                    } else {
+                        *partial = new;
+                    }
                 }
-            }
+            });
         }
         self.coverage.add(rect, samples);
     }

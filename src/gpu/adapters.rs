@@ -2,7 +2,7 @@
 
 use super::GpuError;
 use crate::engine::DeviceInfo;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Which adapter is wanted.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -34,12 +34,17 @@ pub struct Gpu {
     failure: Arc<Mutex<Option<String>>>,
 }
 
-fn instance() -> wgpu::Instance {
-    let mut desc = wgpu::InstanceDescriptor::new_without_display_handle();
-    desc.backends = wgpu::Backends::VULKAN;
-    // Validation layers and debug labels are for developing wgpu programs, at a price.
-    desc.flags = wgpu::InstanceFlags::empty();
-    wgpu::Instance::new(desc)
+/// The one instance of the process, which is never dropped: with the last one the Vulkan loader would unload the driver,
+/// and NVIDIA's leaves each thread that has called it something to do at its end (seen with 580.159: a crash there).
+fn instance() -> &'static wgpu::Instance {
+    static INSTANCE: OnceLock<wgpu::Instance> = OnceLock::new();
+    INSTANCE.get_or_init(|| {
+        let mut desc = wgpu::InstanceDescriptor::new_without_display_handle();
+        desc.backends = wgpu::Backends::VULKAN;
+        // Validation layers and debug labels are for developing wgpu programs, at a price.
+        desc.flags = wgpu::InstanceFlags::empty();
+        wgpu::Instance::new(desc)
+    })
 }
 
 /// Discrete before integrated before virtual before software; ties keep the driver's order.

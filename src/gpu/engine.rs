@@ -11,6 +11,7 @@ use crate::film::{BLOCK, Film, REPLICATES, Sums};
 use crate::kernel::{Access, Kernel, compose};
 use crate::settings::Settings;
 use crate::world::World;
+use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,8 +20,9 @@ use std::time::Instant;
 /// A submission aims to take this long: short for watchdogs and progress, long beside its overhead.
 const SUBMISSION_SECONDS: f64 = 0.1;
 
-/// Paths of the first submission, when nothing has been measured: enough to keep any adapter busy.
-const FIRST_PATHS: f64 = 32768.0;
+/// Paths of the first submission, when nothing has been measured: enough to keep an adapter busy, a software one and
+/// another, and soon done.
+const FIRST_PATHS: [f64; 2] = [32_768.0, 1_048_576.0];
 
 /// The engine that runs a scene's kernel on a Vulkan adapter.
 pub struct GpuEngine {
@@ -365,7 +367,7 @@ impl GpuEngine {
                 }
                 let affordable = match self.seconds_per_path {
                     Some(cost) => SUBMISSION_SECONDS / cost,
-                    None => FIRST_PATHS,
+                    None => FIRST_PATHS[usize::from(!self.gpu.info.software)],
                 };
                 let (mut end, mut sum) = (group + 1, paths[group] as f64);
                 while end < paths.len() && sum + paths[end] as f64 <= affordable {
@@ -378,8 +380,9 @@ impl GpuEngine {
                 // Where there is nothing to do its cost tells nothing.
                 if sum > 0.0 {
                     let cost = start.elapsed().as_secs_f64() / sum;
-                    self.seconds_per_path =
-                        Some(self.seconds_per_path.map_or(cost, |old| 0.5 * (old + cost)));
+                    // What was too little to keep an adapter busy says nothing of what more will cost.
+                    let known = self.seconds_per_path.unwrap_or(cost);
+                    self.seconds_per_path = Some(cost.min(0.5 * (known + cost)));
                 }
                 group = end;
             }
@@ -448,6 +451,29 @@ impl GpuEngine {
     }
 }
 
+/// What the counters of some pixels say, as `shaders/path.wgsl` packs them for a block that begins with sample number `block`:
+/// all of it together, and which pixels have lost samples of which replicates.
+fn count_row(
+    pixels: impl Iterator<Item = (u32, u32, [u32; 4])>,
+    block: u64,
+) -> (Counters, Vec<(u32, u32, [u64; REPLICATES])>) {
+    let mut counters = Counters::default();
+    let mut lost = Vec::new();
+    for (x, y, c) in pixels {
+        let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
+        counters.rays += u64::from(c[0]);
+        counters.truncated += half(1, 0);
+        let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
+        if left_out != [0; REPLICATES] {
+            lost.push((x, y, left_out));
+            counters.nonfinite += left_out.iter().sum::<u64>();
+            let first = (x, y, block + half(1, 16) - 1);
+            counters.first_nonfinite = counters.first_nonfinite.or(Some(first));
+        }
+    }
+    (counters, lost)
+}
+
 impl Engine for GpuEngine {
     fn render_parts(
         &mut self,
@@ -466,17 +492,14 @@ impl Engine for GpuEngine {
             let Part { rect, samples } = part;
             counters.paths += part.paths();
             let block = samples.start / BLOCK * BLOCK;
-            for (x, y) in (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y))) {
-                let c = counted[at(x, y)];
-                let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
-                counters.rays += u64::from(c[0]);
-                counters.truncated += half(1, 0);
-                let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
-                if left_out != [0; REPLICATES] {
-                    film.leave_out(x, y, left_out);
-                    counters.nonfinite += left_out.iter().sum::<u64>();
-                    let first = (x, y, block + half(1, 16) - 1);
-                    counters.first_nonfinite = counters.first_nonfinite.or(Some(first));
+            let rows: Vec<_> = (rect.y0..rect.y1)
+                .into_par_iter()
+                .map(|y| count_row((rect.x0..rect.x1).map(|x| (x, y, counted[at(x, y)])), block))
+                .collect();
+            for (row, lost) in rows {
+                counters += row;
+                for (x, y, samples) in lost {
+                    film.leave_out(x, y, samples);
                 }
             }
             film.put_block(*rect, samples.clone(), |x, y| held[at(x, y)]);

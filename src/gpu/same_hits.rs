@@ -1,4 +1,5 @@
-//! Walks through trees against loops over all surfaces: the same surface at the same distance, to the bit.
+//! Walks through trees against loops over all surfaces: the same surface at the same distance, to the bit where a compiler
+//! takes products and sums as they stand.
 
 use super::probe::{Probe, Values};
 use super::{Choice, Gpu};
@@ -11,6 +12,10 @@ use std::fmt::Write as _;
 
 /// Rays into each scene.
 const RAYS: usize = 170_000;
+
+/// How far distances may differ, relatively, where a compiler may fuse products with sums, and does so otherwise in another
+/// kernel: an H200 gave 124 of 170 000 hits in one of the scenes other last bits, the worst by 5·10⁻⁶.
+const FUSED: f32 = 1e-5;
 
 const BODY: &str = "
     let ray = Ray(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), u32(x[6]), 0u, NO_FACE);
@@ -243,7 +248,12 @@ fn a_walk_through_trees_meets_what_a_loop_meets() {
             hits > RAYS / 100 && shadows > RAYS / 1000,
             "{name}: {hits} {shadows}"
         );
-        let same = |a: &Values, b: &Values| (0..3).all(|k| a[k].to_bits() == b[k].to_bits());
+        let fuses = !gpu.info().software;
+        let same = |a: &Values, b: &Values| {
+            let alike = |a: f32, b: f32| fuses && (a - b).abs() <= FUSED * b.abs();
+            let equal = |k: usize| a[k].to_bits() == b[k].to_bits();
+            equal(0) && equal(2) && (equal(1) || alike(a[1], b[1]))
+        };
         let wrong: Vec<usize> = (0..RAYS).filter(|&i| !same(&loops[i], &walks[i])).collect();
         if let Some(&i) = wrong.first() {
             let (x, a, b) = (&inputs[i][..9], &loops[i][..3], &walks[i][..3]);

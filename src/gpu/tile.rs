@@ -2,6 +2,7 @@
 
 use super::Gpu;
 use crate::film::{REPLICATES, Sums};
+use rayon::prelude::*;
 
 /// Bytes of an rgba32float texel.
 const TEXEL: u32 = 16;
@@ -253,7 +254,8 @@ impl Tile {
         let stride = row_bytes(self.size[0]) as usize;
         let layers = &bytes[counter_bytes.next_multiple_of(256) as usize..];
         running.resize(pixels, Default::default());
-        for (y, row) in running.chunks_exact_mut(width).enumerate() {
+        let rows = running.par_chunks_exact_mut(width).enumerate();
+        rows.for_each(|(y, row)| {
             let rows: [_; REPLICATES] = std::array::from_fn(|r| {
                 &layers[layer_bytes(self.size) as usize * r + y * stride..]
             });
@@ -262,7 +264,7 @@ impl Tile {
                     bytemuck::pod_read_unaligned(&row[x * TEXEL as usize..][..TEXEL as usize])
                 });
             }
-        }
+        });
         drop(mapped);
         self.staging.unmap();
         Ok(counters)

@@ -118,8 +118,10 @@ pub fn face(key: u32) -> u32 {
 /// The scene, ready for rays.
 #[derive(Debug, Clone, PartialEq)]
 pub struct World {
-    /// world position = scene position - origin.
+    /// world position = (scene position - origin) / unit.
     pub origin: DVec3,
+    /// A power of two; 1 but where the scene's lengths are out of the ordinary.
+    pub unit: f64,
     /// The camera for a picture of the size given to [`World::new`].
     pub camera: WorldCamera,
     /// Scattering models that something has, each once.
@@ -140,8 +142,15 @@ impl World {
     /// Prepares `scene` for a picture of `size` pixels.
     pub fn new(scene: &Scene, size: [u32; 2]) -> Self {
         // From here on nothing depends on the order of the file that means nothing.
-        let scene = &order::canonical(scene);
-        let origin = origin::choose_origin(scene);
+        let scene = order::canonical(scene);
+        let scene_origin = origin::choose_origin(&scene);
+        let unit = origin::choose_unit(&scene, scene_origin);
+        let scene = &if unit == 1.0 {
+            scene
+        } else {
+            origin::in_units(&scene, unit)
+        };
+        let origin = scene_origin / unit;
         let eye = scene.camera.eye - origin;
         let mut primitives: Vec<WorldPrimitive> = Vec::with_capacity(scene.primitives.len());
         for kind in ["disk", "cylinder", "plane", "sphere"] {
@@ -202,7 +211,8 @@ impl World {
             medium,
         };
         Self {
-            origin,
+            origin: scene_origin,
+            unit,
             camera,
             materials,
             lights,

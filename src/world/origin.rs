@@ -1,8 +1,9 @@
-//! Where f32 is fine enough: the world's origin, and spheres too large for the ordinary form.
+//! Where f32 is fine and wide enough: the world's origin and its unit of length, and spheres too large for the ordinary form.
 
 use super::{Geometry, WorldLight, WorldPrimitive};
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
+use std::ops::RangeInclusive;
 
 /// The middle of eye, lights and things of ordinary size if f32 coordinates about the file's origin would
 /// be too coarse for some radius (one part in 10⁴), else the file's own origin, whose zeros make simpler
@@ -34,6 +35,72 @@ pub(super) fn choose_origin(scene: &Scene) -> DVec3 {
         .map(|(c, _)| *c);
     let middle: Vec<DVec3> = ordinary.chain([scene.camera.eye]).collect();
     middle.iter().sum::<DVec3>() / middle.len() as f64
+}
+
+/// Lengths whose fourth powers, and whatever products of them a compiler may form on the way to a number without unit, are
+/// well within f32.
+const ORDINARY_LENGTHS: RangeInclusive<f64> = 1e-8..=1e8;
+
+/// The unit of length: 1, but where some radius or distance from the origin is out of the ordinary the power of two nearest the
+/// middle, on a logarithmic scale, of the smallest and the largest. Dividing by it rounds nothing.
+pub(super) fn choose_unit(scene: &Scene, origin: DVec3) -> f64 {
+    let (mut least, mut greatest) = (f64::INFINITY, 0.0f64);
+    let mut reach = |distance: f64| greatest = greatest.max(distance);
+    reach(scene.camera.eye.distance(origin));
+    let mut sized = |center: DVec3, radius: f64| {
+        least = least.min(radius);
+        reach(center.distance(origin) + radius);
+    };
+    for l in &scene.lights {
+        sized(l.center, l.radius);
+    }
+    for p in &scene.primitives {
+        match p.shape {
+            Shape::Sphere { center, radius } | Shape::Disk { center, radius, .. } => {
+                sized(center, radius);
+            }
+            Shape::Cylinder { base, top, radius } => {
+                sized(base, radius);
+                sized(top, radius);
+            }
+            Shape::Plane { .. } => {}
+        }
+    }
+    for p in &scene.primitives {
+        if let Shape::Plane { point, normal } = p.shape {
+            greatest = greatest.max(normal.dot(point - origin).abs());
+        }
+    }
+    if least > greatest || [least, greatest].iter().all(|x| ORDINARY_LENGTHS.contains(x)) {
+        return 1.0;
+    }
+    (0.5 * (least.log2() + greatest.log2())).round().exp2()
+}
+
+/// The scene with every length divided by `unit`.
+pub(super) fn in_units(scene: &Scene, unit: f64) -> Scene {
+    let mut s = scene.clone();
+    s.camera.eye /= unit;
+    s.camera.look_at /= unit;
+    for l in &mut s.lights {
+        l.center /= unit;
+        l.radius /= unit;
+    }
+    for p in &mut s.primitives {
+        match &mut p.shape {
+            Shape::Sphere { center, radius } | Shape::Disk { center, radius, .. } => {
+                *center /= unit;
+                *radius /= unit;
+            }
+            Shape::Cylinder { base, top, radius } => {
+                *base /= unit;
+                *top /= unit;
+                *radius /= unit;
+            }
+            Shape::Plane { point, .. } => *point /= unit,
+        }
+    }
+    s
 }
 
 /// Spheres more than 50 times as large as all that is smaller get the curvature form: in f32 the
@@ -78,5 +145,67 @@ pub(super) fn find_huge_spheres(
         } else if radius <= 50.0 * extent {
             extent = extent.max(distance + radius);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::Scene;
+    use crate::scene::parse::parse_str;
+    use crate::world::World;
+
+    /// A ball, a tube and a disk on a floor under a lamp, with lengths times `scale`.
+    fn still_life(scale: f64) -> Scene {
+        let l = |x: f64| x * scale;
+        let text = format!(
+            "[camera]\neye = [{}, {}, {}]\nlook_at = [0, 0, 0]\nvfov = 40\nresolution = [8, 6]\n\
+             [material.white]\ntype = 'diffuse'\nreflectance = [0.5, 0.5, 0.5]\n\
+             [[plane]]\npoint = [0, {}, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n\
+             [[sphere]]\ncenter = [{}, 0, 0]\nradius = {}\nmaterial = 'white'\n\
+             [[disk]]\ncenter = [0, {}, 0]\nnormal = [0, 1, 0]\nradius = {}\nmaterial = 'white'\n\
+             [[cylinder]]\nbase = [{}, 0, 0]\ntop = [{}, {}, 0]\nradius = {}\nmaterial = 'white'\n\
+             [[light]]\ncenter = [0, {}, 0]\nnormal = [0, -1, 0]\nradius = {}\nradiance = [1, 1, 1]\n",
+            l(0.5),
+            l(1.0),
+            l(6.0),
+            l(-1.0),
+            l(0.75),
+            l(0.5),
+            l(-0.5),
+            l(0.25),
+            l(-1.5),
+            l(-1.5),
+            l(0.5),
+            l(0.25),
+            l(4.0),
+            l(0.125)
+        );
+        parse_str("still.toml".as_ref(), &text).expect("a scene")
+    }
+
+    #[test]
+    fn a_scene_of_any_size_is_the_same_world_in_its_unit() {
+        let plain = World::new(&still_life(1.0), [8, 6]);
+        assert_eq!(plain.unit, 1.0);
+        for exponent in [-46, -40, 40, 46] {
+            let scale = f64::from(exponent).exp2();
+            let world = World::new(&still_life(scale), [8, 6]);
+            // Of an eighth and some six and a half.
+            assert_eq!(world.unit, scale, "2^{exponent}");
+            assert_eq!(world.camera, plain.camera);
+            assert_eq!(world.lights, plain.lights);
+            assert_eq!(world.primitives, plain.primitives);
+        }
+    }
+
+    #[test]
+    fn lengths_of_every_kind_are_brought_to_the_middle() {
+        let mut scene = still_life(1.0);
+        scene.lights[0].radius = 2e-14;
+        scene.camera.eye.z = 300.0;
+        let world = World::new(&scene, [8, 6]);
+        // The power of two next to √(2·10⁻¹⁴ · 300).
+        assert_eq!(world.unit, (-19f64).exp2());
+        assert_eq!(world.lights[0].radius * world.unit, 2e-14);
     }
 }
