@@ -21,7 +21,7 @@ use crate::output::report::{self, Report, Seconds};
 use crate::output::{FileError, Format};
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason, Tally};
-use crate::scene::{Scene, check, parse};
+use crate::scene::{Canonical, Scene, check, parse};
 use crate::settings::Settings;
 use crate::world::World;
 use std::path::{Path, PathBuf};
@@ -58,8 +58,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let regions = plan::regions(args, &settings)?;
     let bounds = plan::bounds(&regions);
     let things = plan::things(&scene);
+    stages.begin(format!("putting {things} in order"));
+    let ordered = Canonical::new(&scene);
     stages.begin(format!("hashing {things}"));
-    let new = Provenance::new(&scene, text, &settings);
+    let new = Provenance::of(&ordered, text, &settings);
     stages.end();
     let (mut film, provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
@@ -79,7 +81,8 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
     // The engine, and the kernel if it is to be shown.
     stages.begin(format!("arranging {things}"));
-    let world = World::new(&scene, settings.size);
+    let world = World::of(&ordered, settings.size);
+    drop(ordered);
     let adapter = args.adapter.as_deref();
     let mut chosen = backend::choose(args.backend, adapter, &world, &settings, |making| {
         stages.begin(match making {

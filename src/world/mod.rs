@@ -24,7 +24,7 @@ mod tree;
 pub use geometry::Geometry;
 pub use tree::{Bounds, Node, Tree};
 
-use crate::scene::{Bsdf, Scene, order};
+use crate::scene::{Bsdf, Canonical, Scene};
 use glam::DVec3;
 use media::Media;
 
@@ -139,8 +139,12 @@ pub struct World {
 impl World {
     /// Prepares `scene` for a picture of `size` pixels.
     pub fn new(scene: &Scene, size: [u32; 2]) -> Self {
-        // From here on nothing depends on the order of the file that means nothing.
-        let scene = &order::canonical(scene);
+        Self::of(&Canonical::new(scene), size)
+    }
+
+    /// The same of a scene that was put in order: nothing depends on the order of the file that means nothing.
+    pub fn of(scene: &Canonical, size: [u32; 2]) -> Self {
+        let scene = scene.scene();
         let origin = origin::choose_origin(scene);
         let eye = scene.camera.eye - origin;
         let mut primitives: Vec<WorldPrimitive> = Vec::with_capacity(scene.primitives.len());
