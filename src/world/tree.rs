@@ -173,20 +173,27 @@ fn split(items: &mut [Entry], room: usize) -> usize {
             bin.0.add(&i.around);
             bin.1 += 1;
         }
-        // Costs of all that lies right of each border, then of both sides.
+        // Costs of all that lies right of each border, then of both sides. Nodes of few items, which are most, leave most bins
+        // empty: behind such a bin a border parts nothing else than before it.
         let mut right = [0.0; BINS];
-        let (mut around, mut count) = (Box32::EMPTY, 0);
+        let (mut around, mut count, mut cost) = (Box32::EMPTY, 0, 0.0);
         for k in (1..BINS).rev() {
-            around.add(&bins[k].0);
-            count += bins[k].1;
-            right[k] = around.half_area() * count as f64;
+            if bins[k].1 > 0 {
+                around.add(&bins[k].0);
+                count += bins[k].1;
+                cost = around.half_area() * count as f64;
+            }
+            right[k] = cost;
         }
         let (mut around, mut count) = (Box32::EMPTY, 0);
         for k in 1..BINS {
+            if bins[k - 1].1 == 0 {
+                continue;
+            }
             around.add(&bins[k - 1].0);
             count += bins[k - 1].1;
             let cost = around.half_area() * count as f64 + right[k];
-            let parts = count > 0 && count < items.len();
+            let parts = count < items.len();
             let fits = count <= room && items.len() - count <= room;
             if parts && fits && best.is_none_or(|b| cost < b.0) {
                 best = Some((cost, axis, k as f32));
