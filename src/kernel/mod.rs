@@ -256,8 +256,9 @@ pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
     s
 }
 
-/// The same beside all that the kernel of `world` has but its path loop: `intersect`, `occluded` and so on.
-pub(crate) fn scene_probe_source(
+/// A shader whose entry point `probe` runs `body` on 16 floats `x` into 16 floats `y`, beside all that the kernel of `world` has but
+/// its path loop: `intersect`, `occluded` and so on. For [`Probe::compile`](crate::gpu::probe::Probe::compile).
+pub fn scene_probe_source(
     world: &World,
     settings: &Settings,
     access: Access,
