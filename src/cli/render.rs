@@ -1,6 +1,6 @@
 //! `etendue render`: from a scene file to pictures, film and report.
 
-use super::args::RenderArgs;
+use super::args::{Backend, RenderArgs};
 use super::backend::{self, Chosen};
 use super::failure::Failure;
 use super::files::{Files, write_text};
@@ -49,6 +49,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     let mut settings = Settings::resolve(&scene, &args.overrides());
     let _lock = args.film.as_deref().map(Lock::new).transpose()?;
+    if let Some(path) = &args.film {
+        stages.begin(format!("reading {}", path.display()));
+    }
     let old = load_film(args)?;
     if let Some((_, provenance)) = &old
         && args.seed.is_none()
@@ -83,6 +86,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     stages.begin(format!("arranging {things}"));
     let world = World::of(&ordered, settings.size);
     drop(ordered);
+    stages.begin(match args.backend {
+        Backend::Cpu => "preparing the reference",
+        Backend::Auto | Backend::Gpu => "opening the adapter",
+    });
     let adapter = args.adapter.as_deref();
     let mut chosen = backend::choose(args.backend, adapter, &world, &settings, |making| {
         stages.begin(match making {
