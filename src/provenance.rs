@@ -2,8 +2,8 @@
 
 use crate::engine::{Counters, DeviceInfo};
 use crate::film::Film;
-use crate::scene::Scene;
-use crate::scene::hash::scene_hash;
+use crate::scene::hash::hash_of;
+use crate::scene::{Canonical, Scene};
 use crate::settings::{Integrator, LightParts, Settings};
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -21,7 +21,7 @@ pub struct Provenance {
     pub sampler_version: u32,
     /// The scene's title.
     pub scene_title: Option<String>,
-    /// [`scene_hash`] of scene and settings.
+    /// [`scene_hash`](crate::scene::hash::scene_hash) of scene and settings.
     pub scene_hash: String,
     /// The scene file's own text.
     pub scene_text: String,
@@ -56,12 +56,17 @@ pub struct DeviceUse {
 impl Provenance {
     /// For a new film of `scene`, whose file reads `scene_text`.
     pub fn new(scene: &Scene, scene_text: impl Into<String>, settings: &Settings) -> Self {
+        Self::of(&Canonical::new(scene), scene_text, settings)
+    }
+
+    /// The same of a scene that was put in order.
+    pub fn of(scene: &Canonical, scene_text: impl Into<String>, settings: &Settings) -> Self {
         Self {
             software: env!("CARGO_PKG_NAME").into(),
             version: env!("CARGO_PKG_VERSION").into(),
             sampler_version: SAMPLER_VERSION,
-            scene_title: scene.title.clone(),
-            scene_hash: scene_hash(scene, settings),
+            scene_title: scene.scene().title.clone(),
+            scene_hash: hash_of(scene, settings),
             scene_text: scene_text.into(),
             settings: settings.clone(),
             samples: 0.0,

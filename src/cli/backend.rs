@@ -3,7 +3,7 @@
 use super::args::Backend;
 use super::failure::Failure;
 use crate::engine::{Engine, tile_pixels};
-use crate::gpu::{self, Gpu, GpuEngine, GpuError};
+use crate::gpu::{self, Gpu, GpuEngine, GpuError, Making};
 use crate::kernel::Access;
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
@@ -28,12 +28,13 @@ pub struct Chosen {
     pub note: Option<String>,
 }
 
-/// The engine that `backend` and `adapter` ask for, ready for this scene.
+/// The engine that `backend` and `adapter` ask for, ready for this scene; `tell` hears what is being made of it.
 pub fn choose(
     backend: Backend,
     adapter: Option<&str>,
     world: &World,
     settings: &Settings,
+    tell: impl FnMut(Making),
 ) -> Result<Chosen, Failure> {
     if backend == Backend::Cpu {
         return Ok(cpu(world, settings, None));
@@ -41,7 +42,9 @@ pub fn choose(
     let choice = gpu::Choice {
         name: adapter.map(str::to_owned),
     };
-    match GpuEngine::new(&choice, world, settings, None) {
+    let made =
+        Gpu::open(&choice).and_then(|gpu| GpuEngine::on_telling(gpu, world, settings, None, tell));
+    match made {
         Ok(engine) => Ok(Chosen {
             compile_seconds: engine.compile_seconds(),
             wgsl: Some(engine.kernel().wgsl.clone()),

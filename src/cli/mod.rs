@@ -21,6 +21,7 @@ mod saver;
 mod schema;
 mod selftest;
 mod signals;
+mod stages;
 mod values;
 
 use crate::output::FileError;

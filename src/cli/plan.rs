@@ -7,6 +7,7 @@ use super::values::MAX_SAMPLES;
 use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
 use crate::output::FileError;
+use crate::scene::Scene;
 use crate::settings::Settings;
 use std::ops::Range;
 use std::path::Path;
@@ -142,6 +143,13 @@ fn end_for_pixel(wanted: u64, ranges: &[Range<u64>]) -> u64 {
         at = r.end;
     }
     at + lacking
+}
+
+/// `4 surfaces`: primitives and lights, of which every scene has several or one.
+pub fn things(scene: &Scene) -> String {
+    let n = scene.primitives.len() + scene.lights.len();
+    let s = if n == 1 { "" } else { "s" };
+    format!("{n} surface{s}")
 }
 
 /// `1 sample a pixel`, `2 samples a pixel`.

@@ -32,13 +32,18 @@ enum Shown {
     Bar(ProgressBar),
 }
 
+/// Whether progress is a bar, as the flags and the terminal have it.
+pub fn has_bar(talk: &Talk) -> bool {
+    !talk.quiet && talk.progress == ProgressStyle::Auto && std::io::stderr().is_terminal()
+}
+
 impl Progress {
     /// What the flags ask for.
     pub fn new(talk: &Talk) -> Self {
         let shown = match talk.progress {
             _ if talk.quiet => Shown::Silent,
             ProgressStyle::None => Shown::Silent,
-            ProgressStyle::Auto if std::io::stderr().is_terminal() => {
+            _ if has_bar(talk) => {
                 let style =
                     BarStyle::with_template("{bar:32} {msg}").unwrap_or(BarStyle::default_bar());
                 let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr());

@@ -110,7 +110,7 @@ fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
         let [width, height] = settings.size.map(u64::from);
         let adapter = args.adapter.as_deref();
         let chosen = memory::check(width * height)
-            .and_then(|()| backend::choose(args.backend, adapter, world, settings));
+            .and_then(|()| backend::choose(args.backend, adapter, world, settings, |_| ()));
         match chosen {
             Ok(chosen) => Ok((chosen.engine, chosen.tile_pixels)),
             Err(Failure::Device(why)) => Err(Trouble::Device(why)),

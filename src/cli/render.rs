@@ -1,6 +1,6 @@
 //! `etendue render`: from a scene file to pictures, film and report.
 
-use super::args::RenderArgs;
+use super::args::{Backend, RenderArgs};
 use super::backend::{self, Chosen};
 use super::failure::Failure;
 use super::files::{Files, write_text};
@@ -8,18 +8,20 @@ use super::plan;
 use super::progress::{Progress, clock, percent};
 use super::saver::{Saver, longest_call};
 use super::signals::Signals;
+use super::stages::Stages;
 use super::{memory, say};
 use crate::engine::{Counters, DeviceInfo};
 use crate::film::coverage::Rect;
 use crate::film::lock::Lock;
 use crate::film::pilot::Pilot;
 use crate::film::{Film, store};
+use crate::gpu::Making;
 use crate::kernel;
 use crate::output::report::{self, Report, Seconds};
 use crate::output::{FileError, Format};
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason, Tally};
-use crate::scene::{Scene, check, parse};
+use crate::scene::{Canonical, Scene, check, parse};
 use crate::settings::Settings;
 use crate::world::World;
 use std::path::{Path, PathBuf};
@@ -38,6 +40,8 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
 
     // The scene, and the film that may be there already.
+    let mut stages = Stages::new(&args.talk);
+    stages.begin(format!("reading {}", args.scene.display()));
     let text = parse::read_text(&args.scene)?;
     let scene = parse::parse_str(&args.scene, &text).map_err(Failure::Scene)?;
     for path in &scene.row_files {
@@ -45,6 +49,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     let mut settings = Settings::resolve(&scene, &args.overrides());
     let _lock = args.film.as_deref().map(Lock::new).transpose()?;
+    if let Some(path) = &args.film {
+        stages.begin(format!("reading {}", path.display()));
+    }
     let old = load_film(args)?;
     if let Some((_, provenance)) = &old
         && args.seed.is_none()
@@ -53,7 +60,12 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
     let regions = plan::regions(args, &settings)?;
     let bounds = plan::bounds(&regions);
-    let new = Provenance::new(&scene, text, &settings);
+    let things = plan::things(&scene);
+    stages.begin(format!("putting {things} in order"));
+    let ordered = Canonical::new(&scene);
+    stages.begin(format!("hashing {things}"));
+    let new = Provenance::of(&ordered, text, &settings);
+    stages.end();
     let (mut film, provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
             check_same_samples(path, &held, &new)?;
@@ -71,8 +83,22 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let samples = plan::samples(args, &settings, &regions, &film.coverage)?;
 
     // The engine, and the kernel if it is to be shown.
-    let world = World::new(&scene, settings.size);
-    let mut chosen = backend::choose(args.backend, args.adapter.as_deref(), &world, &settings)?;
+    stages.begin(format!("arranging {things}"));
+    let world = World::of(&ordered, settings.size);
+    drop(ordered);
+    stages.begin(match args.backend {
+        Backend::Cpu => "preparing the reference",
+        Backend::Auto | Backend::Gpu => "opening the adapter",
+    });
+    let adapter = args.adapter.as_deref();
+    let mut chosen = backend::choose(args.backend, adapter, &world, &settings, |making| {
+        stages.begin(match making {
+            Making::Composing => "composing the kernel".to_owned(),
+            Making::Packing => format!("building trees of {things}"),
+            Making::Compiling => "compiling the kernel".to_owned(),
+        });
+    })?;
+    stages.end();
     if let Some(path) = &args.dump_wgsl {
         let wgsl = chosen.wgsl.take();
         let wgsl = wgsl.unwrap_or_else(|| kernel::compose(&world, &settings, None).wgsl);

@@ -79,6 +79,17 @@ fn goes_on(part: &Part) -> bool {
     !part.samples.start.is_multiple_of(BLOCK)
 }
 
+/// What is under way while an engine is made, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Making {
+    /// The kernel's text.
+    Composing,
+    /// What of the scene lies on the device, trees among it.
+    Packing,
+    /// The kernel, by the driver.
+    Compiling,
+}
+
 impl GpuEngine {
     /// Opens the chosen adapter and compiles the scene's kernel; `access` overrides the rule that picks
     /// baked or buffered values.
@@ -98,11 +109,23 @@ impl GpuEngine {
         settings: &Settings,
         access: Option<Access>,
     ) -> Result<Self, GpuError> {
+        Self::on_telling(gpu, world, settings, access, |_| ())
+    }
+
+    /// The same, and `tell` hears what is under way: large scenes take a while.
+    pub fn on_telling(
+        gpu: impl Into<Arc<Gpu>>,
+        world: &World,
+        settings: &Settings,
+        access: Option<Access>,
+        mut tell: impl FnMut(Making),
+    ) -> Result<Self, GpuError> {
         let gpu = gpu.into();
+        tell(Making::Composing);
         let access = access.unwrap_or_else(|| Access::choose_for(world, &gpu.info));
         let kernel = compose(world, settings, Some(access));
         // SAFETY: it is what `compose` made.
-        unsafe { Self::with_kernel(gpu, world, settings, kernel) }
+        unsafe { Self::make(gpu, world, settings, kernel, tell) }
     }
 
     /// The same with a kernel that has been changed, for tests that must see what a fault does to pictures.
@@ -117,8 +140,21 @@ impl GpuEngine {
         settings: &Settings,
         kernel: Kernel,
     ) -> Result<Self, GpuError> {
+        // SAFETY: as above.
+        unsafe { Self::make(gpu.into(), world, settings, kernel, |_| ()) }
+    }
+
+    /// # Safety
+    ///
+    /// That of [`with_kernel`](Self::with_kernel).
+    unsafe fn make(
+        gpu: Arc<Gpu>,
+        world: &World,
+        settings: &Settings,
+        kernel: Kernel,
+        mut tell: impl FnMut(Making),
+    ) -> Result<Self, GpuError> {
         let start = Instant::now();
-        let gpu = gpu.into();
         let unable = |problem: String| GpuError::Unable {
             adapter: gpu.info.name.clone(),
             problem,
@@ -130,6 +166,7 @@ impl GpuEngine {
                 kernel.trips_per_sample, settings.max_depth
             )));
         }
+        tell(Making::Packing);
         let packed = pack(world, kernel.access);
         let device = &gpu.device;
         if let Some(problem) = scene::too_large(&packed, &device.limits()) {
@@ -137,6 +174,7 @@ impl GpuEngine {
         }
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let oom = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        tell(Making::Compiling);
         // SAFETY: without runtime checks the kernel must not index out of bounds or loop for ever. All its
         // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
         // length, or pixels that it compares with the tile's size first; its loops run over constant

@@ -12,7 +12,7 @@ mod tile;
 mod work;
 
 pub use adapters::{AdapterReport, Choice, Gpu, adapters};
-pub use engine::GpuEngine;
+pub use engine::{GpuEngine, Making};
 
 /// Why there is no GPU engine.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

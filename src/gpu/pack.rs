@@ -99,10 +99,14 @@ fn f(v: DVec3) -> [f32; 3] {
     v.as_vec3().to_array()
 }
 
-/// The trees of [`Access::Tree`], one after the other, as tree.wgsl says.
-fn pack_trees(world: &World, parted: &trees::Parted, surfaces: &[Surface]) -> Vec<[u32; 4]> {
+/// Appends the trees of [`Access::Tree`], one after the other, as tree.wgsl says.
+fn pack_trees(
+    records: &mut Vec<[u32; 4]>,
+    world: &World,
+    parted: &trees::Parted,
+    surfaces: &[Surface],
+) {
     let blocks = trees::blockers(world);
-    let mut records: Vec<[u32; 4]> = Vec::new();
     for group in &parted.groups {
         debug_assert_eq!(records.len(), group.header);
         let tree = Tree::new(&trees::boxes(world, group));
@@ -152,7 +156,6 @@ fn pack_trees(world: &World, parted: &trees::Parted, surfaces: &[Surface]) -> Ve
             records.extend([[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]]);
         }
     }
-    records
 }
 
 /// The light clusters of a world, and which lights are where, as light_tree.wgsl says.
@@ -189,7 +192,9 @@ fn pack_records(
 ) -> Vec<[u32; 4]> {
     let parted = trees::Parted::new(world);
     let at = Records::new(world, &parted);
-    let mut records = pack_trees(world, &parted, surfaces);
+    let row = RECORDS_A_ROW as usize;
+    let mut records = Vec::with_capacity(at.end.next_multiple_of(row));
+    pack_trees(&mut records, world, &parted, surfaces);
     debug_assert_eq!(records.len(), at.surfaces);
     records.extend_from_slice(bytemuck::cast_slice(surfaces));
     debug_assert_eq!(records.len(), at.materials);
@@ -201,7 +206,6 @@ fn pack_records(
         records.extend(pack_lights(world));
     }
     debug_assert_eq!(records.len(), at.end);
-    let row = RECORDS_A_ROW as usize;
     if records.len() > row {
         records.resize(records.len().next_multiple_of(row), [0; 4]);
     }

@@ -24,6 +24,7 @@ use literal::{float, vector};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::ops::RangeInclusive;
+use trees::Parted;
 
 /// Squared, the camera rays that a sample sends in a pixel that may see a light.
 const GLANCES: u32 = 4;
@@ -136,7 +137,7 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
         Access::Tree => 0,
         Access::Baked | Access::Buffers => {
             let vertices = u64::from(last_depth(settings));
-            let trips = vertices.saturating_mul(trips_at_vertex(world, settings, access))
+            let trips = vertices.saturating_mul(trips_at_vertex(world, settings, access, None))
                 + trips_at_start(world, access, &features);
             // The loop over turns is in one of its own then, which goes round no more often.
             let turns = vertices + u64::from(GLANCES * GLANCES);
@@ -155,15 +156,20 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     }
 }
 
-/// The loop trips that a vertex can take of an invocation; but for walks through trees, which count theirs.
-fn trips_at_vertex(world: &World, settings: &Settings, access: Access) -> u64 {
+/// The loop trips that a vertex can take of an invocation; but for walks through the trees of `parted`, which count theirs.
+fn trips_at_vertex(
+    world: &World,
+    settings: &Settings,
+    access: Access,
+    parted: Option<&Parted>,
+) -> u64 {
     // Loops over all surfaces for a ray, and over all lights to choose one.
     let (ray, choice) = match access {
         Access::Baked => (0, 0),
         Access::Buffers => (surfaces(world), world.lights.len() as u64),
         // Surfaces without bounds, if they are many.
         Access::Tree => (
-            trees::Parted::new(world).apart.len() as u64,
+            parted.map_or(0, |p| p.apart.len() as u64),
             2 * lights::trips(world),
         ),
     };
@@ -206,15 +212,15 @@ fn scene_text(
     let mut s = String::new();
     tags(&mut s);
     s.push_str(&constants(world, settings));
-    if access == Access::Tree {
-        let vertex = trips_at_vertex(world, settings, access);
+    let parted = (access == Access::Tree).then(|| Parted::new(world));
+    if let Some(parted) = &parted {
+        let vertex = trips_at_vertex(world, settings, access, Some(parted));
         let start = trips_at_start(world, access, features);
         let _ = writeln!(
             s,
             "const TRIPS_AT_VERTEX: u32 = {vertex}u;\nconst TRIPS_AT_START: u32 = {start}u;"
         );
-        let parted = trees::Parted::new(world);
-        s.push_str(&records::Records::new(world, &parted).constants(world));
+        s.push_str(&records::Records::new(world, parted).constants(world));
     }
     for (name, text) in MODULES {
         if needs(name, features) {
@@ -226,7 +232,7 @@ fn scene_text(
         }
     }
     s.push_str("\n// ---- this scene\n\n");
-    s.push_str(&rays::generate(world, access, features));
+    s.push_str(&rays::generate(world, access, features, parted.as_ref()));
     if features.contains("IMAGES") {
         let images = images::of(world, settings, access);
         s.push_str(&images::generate(world, &images));
@@ -250,8 +256,9 @@ pub(crate) fn probe_source(features: &[&'static str], body: &str) -> String {
     s
 }
 
-/// The same beside all that the kernel of `world` has but its path loop: `intersect`, `occluded` and so on.
-pub(crate) fn scene_probe_source(
+/// A shader whose entry point `probe` runs `body` on 16 floats `x` into 16 floats `y`, beside all that the kernel of `world` has but
+/// its path loop: `intersect`, `occluded` and so on. For [`Probe::compile`](crate::gpu::probe::Probe::compile).
+pub fn scene_probe_source(
     world: &World,
     settings: &Settings,
     access: Access,

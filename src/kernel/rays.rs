@@ -8,18 +8,23 @@ use glam::DVec3;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>) -> String {
+/// `parted` is how the world is parted where there are trees.
+pub(super) fn generate(
+    world: &World,
+    access: Access,
+    features: &BTreeSet<&str>,
+    parted: Option<&Parted>,
+) -> String {
     let mut s = String::new();
     let shadows = features.contains("LIGHT_SAMPLING");
     let everything: Vec<Surface> = surfaces(world);
     // With trees the surfaces outside them are met as those of small scenes, if they are no more.
-    let parted = (access == Access::Tree).then(|| Parted::new(world));
-    let (mut one_by_one, each) = match &parted {
+    let (mut one_by_one, each) = match parted {
         Some(parted) if parted.apart.len() <= BAKED_LIMIT => (parted.apart.clone(), Access::Baked),
         Some(parted) => (parted.apart.clone(), Access::Buffers),
         None => (everything, access),
     };
-    if let Some(parted) = &parted {
+    if let Some(parted) = parted {
         s.push_str(&trees::walks(world, parted, shadows));
     }
     s.push_str(
@@ -27,7 +32,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
     );
     s.push_str("fn intersect(ray: Ray) -> Hit {\n    var hit = Hit(FAR, NONE);\n");
     calls(&mut s, world, &one_by_one, each, true);
-    if let Some(parted) = &parted {
+    if let Some(parted) = parted {
         trees::calls(&mut s, parted, "nearest");
     }
     s.push_str("    return hit;\n}\n");
@@ -41,7 +46,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
             b.function = shadow_function(world, b);
         }
         calls(&mut s, world, &one_by_one, each, false);
-        if let Some(parted) = &parted {
+        if let Some(parted) = parted {
             trees::calls(&mut s, parted, "any");
         }
         if lights_overlap(world) {

@@ -5,7 +5,7 @@
 //! points) are two scenes: the hash may part what is equal, never join what differs. Order in the file counts
 //! among surfaces of one kind that coincide, for there it decides what is met, and nowhere else.
 
-use super::{Bsdf, Camera, Light, Primitive, Scene, Shape, order};
+use super::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
 use crate::settings::{Integrator, LightParts, Settings};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
@@ -19,8 +19,13 @@ const DIRECTION_STEP: f64 = 1.0 / (1u64 << 44) as f64;
 /// Not covered: comments, layout, title, names, materials that nothing uses, order where it means nothing, and what only moves the
 /// noise (seed, strata, shadow rays).
 pub fn scene_hash(scene: &Scene, settings: &Settings) -> String {
+    hash_of(&Canonical::new(scene), settings)
+}
+
+/// [`scene_hash`] of the scene that was put in order.
+pub fn hash_of(scene: &Canonical, settings: &Settings) -> String {
     let mut h = Hasher(Sha256::new_with_prefix("etendue scene 2\0"));
-    let scene = &order::canonical(scene);
+    let scene = scene.scene();
     h.settings(settings);
     h.camera(&scene.camera);
     h.count(scene.primitives.len());

@@ -7,7 +7,7 @@ pub mod check;
 mod format;
 pub mod generate;
 pub mod hash;
-pub(crate) mod order;
+mod order;
 pub mod parse;
 mod reader;
 mod rows;
@@ -15,6 +15,7 @@ pub mod schema;
 mod source;
 mod value;
 
+pub use order::Canonical;
 pub use rows::MAX_ROWS_BYTES;
 pub use value::LARGEST_STRATA;
 

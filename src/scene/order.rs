@@ -7,12 +7,27 @@
 use super::check::may_coincide;
 use super::{Bsdf, Light, Material, Primitive, Scene, Shape};
 use glam::DVec3;
-use rayon::slice::ParallelSliceMut as _;
-use std::cmp::Ordering;
-use std::collections::{BTreeMap, HashMap};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
-/// The scene in its one order, with the materials that are in use, each once. For 10⁶ primitives it takes a second or two.
-pub(crate) fn canonical(scene: &Scene) -> Scene {
+/// A scene in its one order, with the materials that are in use, each once: hash and world are made from it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Canonical(Scene);
+
+impl Canonical {
+    /// Of `scene`. For 10⁶ primitives it takes half a second or more: make it once for hash and world.
+    pub fn new(scene: &Scene) -> Self {
+        Self(canonical(scene))
+    }
+
+    /// The scene in that order.
+    pub(crate) fn scene(&self) -> &Scene {
+        &self.0
+    }
+}
+
+fn canonical(scene: &Scene) -> Scene {
     let mut s = scene.clone();
     merge_materials(&mut s);
 
@@ -45,34 +60,35 @@ pub(crate) fn canonical(scene: &Scene) -> Scene {
     s
 }
 
-/// Numbers that tell one thing from another.
-type Key = [f64; 12];
+/// Numbers that tell one thing from another, as bits with their order.
+type Key = [u64; 12];
+
+/// How many numbers of a key lie side by side while things are sorted: kind, size and two coordinates tell most apart.
+const FIRST: usize = 4;
 
 fn key(numbers: impl IntoIterator<Item = f64>) -> Key {
     let mut key = Key::default();
     for (k, x) in key.iter_mut().zip(numbers) {
-        *k = x + 0.0; // the two zeros are one
+        let bits = (x + 0.0).to_bits(); // the two zeros are one
+        // Negative ones the other way round, below the positive: the order of `f64::total_cmp`.
+        *k = if bits >> 63 == 1 {
+            !bits
+        } else {
+            bits | 1 << 63
+        };
     }
     key
 }
 
-fn compare(a: &Key, b: &Key) -> Ordering {
-    a.iter()
-        .zip(b)
-        .map(|(x, y)| x.total_cmp(y))
-        .find(|o| o.is_ne())
-        .unwrap_or(Ordering::Equal)
-}
-
-/// Indices into `list` by the keys of what they stand for.
+/// Indices into `list` by the keys of what they stand for, equal ones in ascending order.
 fn sorted<T: Sync>(list: &[T], key: impl Fn(&T) -> Key + Sync) -> Vec<usize> {
-    // The first two numbers of a key tell most things apart, and lie side by side.
-    let mut order: Vec<([f64; 2], usize)> = (list.iter().map(&key).map(|k| [k[0], k[1]]))
-        .zip(0..)
-        .collect();
-    order.par_sort_by(|(p, a), (q, b)| {
-        let first = p[0].total_cmp(&q[0]).then(p[1].total_cmp(&q[1]));
-        first.then_with(|| compare(&key(&list[*a]), &key(&list[*b])))
+    let first = |thing: &T| *key(thing).first_chunk::<FIRST>().expect("keys are longer");
+    let firsts = list.par_iter().map(first);
+    let mut order: Vec<([u64; FIRST], usize)> = firsts.zip(0..list.len()).collect();
+    order.par_sort_unstable_by(|(p, a), (q, b)| {
+        p.cmp(q)
+            .then_with(|| key(&list[*a]).cmp(&key(&list[*b])))
+            .then(a.cmp(b))
     });
     order.into_iter().map(|(_, i)| i).collect()
 }
@@ -229,45 +245,118 @@ type Cell = (u8, i32, [i64; 3]);
 /// Edge of a cell over the largest radius of a ball in its grid: most balls meet one cell.
 const CELL: f64 = 8.0;
 
-/// Calls `visit` with all pairs of shapes of one kind whose balls meet, and some more.
-fn for_each_near_pair(shapes: &[Shape], mut visit: impl FnMut(usize, usize)) {
-    let places: Vec<(DVec3, f64)> = shapes.iter().map(place).collect();
-    let level = |reach: f64| reach.log2().ceil() as i32;
-    let mut cells: HashMap<Cell, Vec<usize>> = HashMap::new();
-    let mut levels: BTreeMap<u8, Vec<i32>> = BTreeMap::new();
-    for (k, (shape, (center, reach))) in shapes.iter().zip(&places).enumerate() {
-        let l = level(*reach);
-        let edge = CELL * f64::from(l).exp2();
-        let at = (*center / edge).to_array().map(|x| x.floor() as i64);
-        cells.entry((kind(shape), l, at)).or_default().push(k);
-        let known = levels.entry(kind(shape)).or_default();
-        if let Err(at) = known.binary_search(&l) {
-            known.insert(at, l);
+fn cell(kind: u8, level: i32, p: DVec3) -> Cell {
+    let at = p / (CELL * f64::from(level).exp2());
+    (kind, level, at.to_array().map(|x| x.floor() as i64))
+}
+
+/// Balls by their cells.
+struct Grid {
+    balls: Vec<Ball>,
+    /// Kinds and levels that there are.
+    levels: Vec<(u8, i32)>,
+    /// By a hash of cells, one of the balls there, or [`NONE`].
+    heads: Vec<u32>,
+    /// Of each ball the next with its hash.
+    next: Vec<u32>,
+}
+
+/// No ball.
+const NONE: u32 = u32::MAX;
+
+struct Ball {
+    center: DVec3,
+    reach: f64,
+    cell: Cell,
+}
+
+impl Grid {
+    fn new(shapes: &[Shape]) -> Self {
+        let ball = |shape| {
+            let (center, reach) = place(shape);
+            let level = reach.log2().ceil() as i32;
+            let cell = cell(kind(shape), level, center);
+            Ball {
+                center,
+                reach,
+                cell,
+            }
+        };
+        let balls: Vec<Ball> = shapes.par_iter().map(ball).collect();
+        let mut levels = Vec::new();
+        let mut heads = vec![NONE; (2 * balls.len()).next_power_of_two()];
+        let mut next = vec![NONE; balls.len()];
+        for (k, ball) in (0..).zip(&balls) {
+            let (kind, level, _) = ball.cell;
+            if !levels.contains(&(kind, level)) {
+                levels.push((kind, level));
+            }
+            let head = &mut heads[Self::slot(&ball.cell, balls.len())];
+            next[k as usize] = std::mem::replace(head, k);
+        }
+        Self {
+            balls,
+            levels,
+            heads,
+            next,
         }
     }
-    for (k, (shape, (center, reach))) in shapes.iter().zip(&places).enumerate() {
-        let own = level(*reach);
-        for &l in levels[&kind(shape)].iter().filter(|l| **l >= own) {
-            let radius = f64::from(l).exp2();
-            let cell = |p: DVec3| (p / (CELL * radius)).to_array().map(|x| x.floor() as i64);
-            let (low, high) = (
-                cell(*center - reach - radius),
-                cell(*center + reach + radius),
-            );
+
+    /// Index of a cell of `balls` balls in [`heads`](Self::heads).
+    fn slot(&(kind, level, at): &Cell, balls: usize) -> usize {
+        // Odd numbers with no pattern to their bits: those of the golden ratio.
+        const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
+        let words = [u64::from(kind), level as u64]
+            .into_iter()
+            .chain(at.map(|x| x as u64));
+        let hash = words.fold(0, |h: u64, x| (h.rotate_left(23) ^ x).wrapping_mul(MIX));
+        (hash >> 32) as usize & ((2 * balls).next_power_of_two() - 1)
+    }
+
+    /// Calls `found` with balls of its kind that ball `k` meets, and some more, until it breaks; each pair from one side
+    /// alone: of larger ones all, of its level those before it.
+    fn near(&self, k: usize, mut found: impl FnMut(usize) -> ControlFlow<()>) -> ControlFlow<()> {
+        let ball = &self.balls[k];
+        let (own_kind, own_level, _) = ball.cell;
+        for &(kind, level) in &self.levels {
+            if kind != own_kind || level < own_level {
+                continue;
+            }
+            let reach = ball.reach + f64::from(level).exp2();
+            let (_, _, low) = cell(kind, level, ball.center - reach);
+            let (_, _, high) = cell(kind, level, ball.center + reach);
             for x in low[0]..=high[0] {
                 for y in low[1]..=high[1] {
                     for z in low[2]..=high[2] {
-                        let there = cells.get(&(kind(shape), l, [x, y, z]));
-                        for &m in there.into_iter().flatten() {
-                            // Pairs of one level are found from either side.
-                            if level(places[m].1) > own || m < k {
-                                visit(m, k);
+                        let there = (kind, level, [x, y, z]);
+                        let mut next = self.heads[Self::slot(&there, self.balls.len())];
+                        while next != NONE {
+                            let m = next as usize;
+                            if (level > own_level || m < k) && self.balls[m].cell == there {
+                                found(m)?;
                             }
+                            next = self.next[m];
                         }
                     }
                 }
             }
         }
+        ControlFlow::Continue(())
+    }
+}
+
+/// Calls `visit` with all pairs of shapes of one kind whose balls meet, and some more.
+fn for_each_near_pair(shapes: &[Shape], mut visit: impl FnMut(usize, usize)) {
+    let grid = Grid::new(shapes);
+    // Most have nothing near them, which any thread can tell.
+    let all = (0..shapes.len()).into_par_iter();
+    let some_near: Vec<usize> =
+        (all.filter(|&k| grid.near(k, |_| ControlFlow::Break(())).is_break())).collect();
+    for k in some_near {
+        let _ = grid.near(k, |m| {
+            visit(m, k);
+            ControlFlow::Continue(())
+        });
     }
 }
 

@@ -24,7 +24,7 @@ mod tree;
 pub use geometry::Geometry;
 pub use tree::{Bounds, Node, Tree};
 
-use crate::scene::{Bsdf, Scene, order};
+use crate::scene::{Bsdf, Canonical, Scene};
 use glam::DVec3;
 use media::Media;
 
@@ -141,15 +141,15 @@ pub struct World {
 impl World {
     /// Prepares `scene` for a picture of `size` pixels.
     pub fn new(scene: &Scene, size: [u32; 2]) -> Self {
-        // From here on nothing depends on the order of the file that means nothing.
-        let scene = order::canonical(scene);
-        let scene_origin = origin::choose_origin(&scene);
-        let unit = origin::choose_unit(&scene, scene_origin);
-        let scene = &if unit == 1.0 {
-            scene
-        } else {
-            origin::in_units(&scene, unit)
-        };
+        Self::of(&Canonical::new(scene), size)
+    }
+
+    /// The same of a scene that was put in order: nothing depends on the order of the file that means nothing.
+    pub fn of(scene: &Canonical, size: [u32; 2]) -> Self {
+        let scene_origin = origin::choose_origin(scene.scene());
+        let unit = origin::choose_unit(scene.scene(), scene_origin);
+        let in_units = (unit != 1.0).then(|| origin::in_units(scene.scene(), unit));
+        let scene = in_units.as_ref().unwrap_or(scene.scene());
         let origin = scene_origin / unit;
         let eye = scene.camera.eye - origin;
         let mut primitives: Vec<WorldPrimitive> = Vec::with_capacity(scene.primitives.len());

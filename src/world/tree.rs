@@ -173,20 +173,27 @@ fn split(items: &mut [Entry], room: usize) -> usize {
             bin.0.add(&i.around);
             bin.1 += 1;
         }
-        // Costs of all that lies right of each border, then of both sides.
+        // Costs of all that lies right of each border, then of both sides. Nodes of few items, which are most, leave most bins
+        // empty: behind such a bin a border parts nothing else than before it.
         let mut right = [0.0; BINS];
-        let (mut around, mut count) = (Box32::EMPTY, 0);
+        let (mut around, mut count, mut cost) = (Box32::EMPTY, 0, 0.0);
         for k in (1..BINS).rev() {
-            around.add(&bins[k].0);
-            count += bins[k].1;
-            right[k] = around.half_area() * count as f64;
+            if bins[k].1 > 0 {
+                around.add(&bins[k].0);
+                count += bins[k].1;
+                cost = around.half_area() * count as f64;
+            }
+            right[k] = cost;
         }
         let (mut around, mut count) = (Box32::EMPTY, 0);
         for k in 1..BINS {
+            if bins[k - 1].1 == 0 {
+                continue;
+            }
             around.add(&bins[k - 1].0);
             count += bins[k - 1].1;
             let cost = around.half_area() * count as f64 + right[k];
-            let parts = count > 0 && count < items.len();
+            let parts = count < items.len();
             let fits = count <= room && items.len() - count <= room;
             if parts && fits && best.is_none_or(|b| cost < b.0) {
                 best = Some((cost, axis, k as f32));
@@ -233,6 +240,52 @@ fn levels(boxes: usize) -> u32 {
     }
 }
 
+/// Boxes with fewer are not worth another thread.
+const LEAST_APART: usize = 1 << 14;
+
+/// Makes a node and all below it of these items. `rows` are the places of all these nodes, one row a level.
+fn build(items: &mut [Entry], mut rows: Vec<&mut [Node]>) {
+    if items.len() < LEAST_APART {
+        // What is still to be made: levels of nodes, their places there, and their items.
+        let mut open = vec![(0, 0, 0..items.len())];
+        while let Some((level, at, range)) = open.pop() {
+            let middle = range.start + node(&mut items[range.clone()], &mut rows[level..], at);
+            if range.len() > 1 {
+                let halves = [
+                    (2 * at, range.start..middle),
+                    (2 * at + 1, middle..range.end),
+                ];
+                open.extend(halves.map(|(at, range)| (level + 1, at, range)));
+            }
+        }
+        return;
+    }
+    let middle = node(items, &mut rows, 0);
+    let (first, second) = items.split_at_mut(middle);
+    let halves = rows.into_iter().skip(1);
+    let (left, right) = halves.map(|row| row.split_at_mut(row.len() / 2)).unzip();
+    rayon::join(|| build(first, left), || build(second, right));
+}
+
+/// Makes the node that has place `at` in the first of `rows`, if it has any items, and parts these; returns how many are in the
+/// first half.
+fn node(items: &mut [Entry], rows: &mut [&mut [Node]], at: usize) -> usize {
+    if items.is_empty() {
+        return 0;
+    }
+    let mut around = Box32::EMPTY;
+    items.iter().for_each(|e| around.add(&e.around));
+    rows[0][at] = Node {
+        min: around.min,
+        max: around.max,
+        item: (items.len() == 1).then(|| items[0].item),
+    };
+    if items.len() == 1 {
+        return 1;
+    }
+    split(items, 1 << (rows.len() - 2))
+}
+
 impl Tree {
     /// How many node numbers a tree of so many boxes has.
     pub fn numbers(boxes: usize) -> usize {
@@ -249,27 +302,13 @@ impl Tree {
             })
             .collect();
         let mut nodes = vec![Node::EMPTY; Self::numbers(boxes.len())];
-        let levels = levels(boxes.len());
-        // What is still to be made: numbers of nodes, and their items.
-        let mut open = vec![(1, 0..items.len())];
-        while let Some((k, range)) = open.pop() {
-            let these = &mut items[range.clone()];
-            if these.is_empty() {
-                continue;
-            }
-            let mut around = Box32::EMPTY;
-            these.iter().for_each(|e| around.add(&e.around));
-            nodes[k] = Node {
-                min: around.min,
-                max: around.max,
-                item: (these.len() == 1).then(|| these[0].item),
-            };
-            if these.len() > 1 {
-                let room = 1 << (levels - k.ilog2() - 1);
-                let middle = range.start + split(these, room);
-                open.extend([(2 * k, range.start..middle), (2 * k + 1, middle..range.end)]);
-            }
-        }
+        let mut rest = &mut nodes[1..];
+        let rows = (0..=levels(boxes.len())).map(|level| {
+            let (row, below) = std::mem::take(&mut rest).split_at_mut(1 << level);
+            rest = below;
+            row
+        });
+        build(&mut items, rows.collect());
         Self { nodes }
     }
 

@@ -184,3 +184,39 @@ fn a_picture_to_follow_is_left_as_the_last_one() {
     let (a, w) = (fs::read(bench.path("a.png")), fs::read(bench.path("w.png")));
     assert_eq!(a.unwrap(), w.unwrap());
 }
+
+/// On a terminal a stage that takes long is named until it ends; elsewhere, and where no bar is wanted, none is.
+#[cfg(target_os = "linux")]
+#[test]
+fn long_stages_are_named_on_a_terminal_alone() {
+    let bench = Bench::new();
+    // A scene that comes slowly, whatever the machine.
+    let script = r#"
+        export TERM=xterm
+        render() {
+            mkfifo "$1.toml" && { sleep 1; cat box.toml; } > "$1.toml" &
+            while [ ! -p "$1.toml" ]; do sleep 0.01; done
+            command="'$0' render $1.toml --backend cpu --spp 1 -o $1.png $3"
+            if [ "$2" = terminal ]; then script -qec "$command" "$1" > /dev/null; else sh -c "$command" 2> "$1"; fi
+        }
+        render bar terminal &&
+            render quiet terminal --quiet &&
+            render none terminal "--progress none" &&
+            render plain terminal "--progress plain" &&
+            render file file
+    "#;
+    assert_eq!(bench.shell(&[], script), 0, "{}", bench.said());
+    let said = |name| String::from_utf8_lossy(&fs::read(bench.path(name)).unwrap()).into_owned();
+    let bar = said("bar");
+    let (stage, after) = bar.rsplit_once("reading bar.toml, ").expect(&bar);
+    assert!(stage.contains("reading bar.toml, 0."), "{bar:?}");
+    // Cleared before anything else is said.
+    let (rest, said_next) = after.split_once("bar.toml: 24x16").expect(&bar);
+    assert!(
+        rest.contains("\x1b[2K") && said_next.contains("wrote"),
+        "{bar:?}"
+    );
+    for name in ["quiet", "none", "plain", "file"] {
+        assert!(!said(name).contains("reading"), "{:?}", said(name));
+    }
+}

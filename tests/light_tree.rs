@@ -1,0 +1,354 @@
+//! The tree that many lights are chosen from: its pictures against the CPU reference, which looks at every light for every
+//! choice, and its probabilities one by one.
+//!
+//! Direct light alone, in which every path chooses a light and some meet one by chance: whatever is wrong with the choice, or
+//! with what it is weighed against, is in the picture undiluted; the mean of the picture is known to 0.2 %.
+//!
+//! Faults that these tests have been seen to catch, each put into the shaders for a try:
+//!
+//! - by picture and probabilities: the probability said of the first half of all lights too large by 2 %; first halves chosen
+//!   too often by 2 %, or by 4 % in the last level alone; halves mistaken for each other in the look-up; the fourth light of
+//!   a cluster never chosen;
+//! - by the picture alone: lights met by chance weighed with one and a half times their probability, or with 1 % for each;
+//!   diffuse surfaces' light samples not weighed at all;
+//! - by the probabilities alone, for a quarter of a per cent of the picture at most is in it: one cluster in eight with a
+//!   probability wrong by 2 %; clusters taken for dark at cosines below 0.15, of lamps, of the receiver or of both; balls of
+//!   clusters too small by 0.3 of their radius; cones too narrow by 0.2 in the cosine, or left out.
+//!
+//! Not seen: lights met by chance weighed with 0.98 of their probability, which moves the picture by a thousandth.
+
+mod common;
+
+use common::{block_means, cpu, film, scene, settings, worst_t};
+use etendue::gpu::probe::{Probe, UNWRITTEN, Values};
+use etendue::gpu::{Choice, Gpu, GpuEngine};
+use etendue::kernel::{Access, MOST_LOOKED_AT, scene_probe_source};
+use etendue::reference::Estimator;
+use etendue::scene::Scene;
+use etendue::settings::{LightParts, Settings};
+use etendue::world::{Geometry, World};
+use glam::DVec3;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::f64::consts::TAU;
+
+const FALSE_ALARM: f64 = 1e-4;
+const SIZE: [u32; 2] = [32, 24];
+/// Pixels along an edge of a block: few enough that a lamp's surroundings are one of their own.
+const BLOCK: u32 = 8;
+const RUNS: u32 = 16;
+/// Samples a run, on the GPU and of the reference.
+const SAMPLES: [u64; 2] = [512, 512];
+
+/// Deterministic uniform numbers.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f64 / (1u64 << 24) as f64
+    }
+
+    fn between(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.next()
+    }
+
+    /// With an evenly distributed logarithm.
+    fn scale(&mut self, a: f64, b: f64) -> f64 {
+        a * (b / a).powf(self.next())
+    }
+
+    fn inside(&mut self, [low, high]: [[f64; 3]; 2]) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|k| self.between(low[k], high[k])))
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        let (z, turn) = (self.between(-1.0, 1.0), TAU * self.next());
+        let across = (1.0 - z * z).sqrt();
+        DVec3::new(across * turn.cos(), across * turn.sin(), z)
+    }
+}
+
+/// The inside of the hall, which is open behind the camera.
+const HALL: [[f64; 3]; 2] = [[-4.0, 0.0, -8.0], [4.0, 4.0, 6.0]];
+
+/// A hall with glossy floor, columns and balls, and a hundred lamps of all sizes, colours and directions: hanging, turned up,
+/// close to walls and turned to them, far away and very bright.
+fn hall() -> Scene {
+    let mut text = String::from(
+        "[camera]\neye = [0, 1.7, 5.5]\nlook_at = [0, 1.6, 0]\nvfov = 60\nresolution = [32, 24]\n\
+         [material.stone]\ntype = 'diffuse'\nreflectance = [0.7, 0.7, 0.6]\n\
+         [material.marble]\ntype = 'phong'\ndiffuse = [0.2, 0.2, 0.3]\nspecular = [0.6, 0.6, 0.6]\nexponent = 30\n",
+    );
+    for (point, normal, material) in [
+        ("[0, 0, 0]", "[0, 1, 0]", "marble"),
+        ("[0, 4, 0]", "[0, -1, 0]", "stone"),
+        ("[-4, 0, 0]", "[1, 0, 0]", "stone"),
+        ("[4, 0, 0]", "[-1, 0, 0]", "stone"),
+        ("[0, 0, -8]", "[0, 0, 1]", "stone"),
+    ] {
+        text +=
+            &format!("[[plane]]\npoint = {point}\nnormal = {normal}\nmaterial = '{material}'\n");
+    }
+    for i in 0..6 {
+        let (x, z) = ([-2.5, 2.5][i % 2], 3.0 - 3.0 * (i / 2) as f64);
+        text += &format!(
+            "[[cylinder]]\nbase = [{x}, 0, {z}]\ntop = [{x}, 4, {z}]\nradius = 0.3\nmaterial = 'stone'\n\
+             [[sphere]]\ncenter = [{}, 0.5, {}]\nradius = 0.5\nmaterial = 'marble'\n",
+            0.5 * x,
+            z - 1.0
+        );
+    }
+    let mut r = Numbers(5);
+    let mut lamp = |center: DVec3, normal: DVec3, radius: f64, power: f64, r: &mut Numbers| {
+        let hue = [0.0, 1.0, 2.0].map(|k| 0.1 + (0.5 + 0.5 * (TAU * k / 3.0 + 9.0 * power).cos()));
+        let [red, green, blue] = hue.map(|c| c * power * r.scale(0.3, 3.0) / (radius * radius));
+        text += &format!(
+            "[[light]]\ncenter = {:?}\nnormal = {:?}\nradius = {radius}\nradiance = [{red}, {green}, {blue}]\n",
+            center.to_array(),
+            normal.to_array()
+        );
+    };
+    let air = [[-3.6, 2.3, -7.0], [3.6, 3.5, 4.0]];
+    for i in 0..100 {
+        let radius = r.scale(0.03, 0.25);
+        let at = r.inside(air);
+        let any = r.direction();
+        let down = DVec3::NEG_Y + 0.8 * any;
+        match i {
+            // Hanging, each turned its own way, and not so few turned up.
+            0..=59 => lamp(at, down, radius, 0.1, &mut r),
+            60..=74 => lamp(at, -down, radius, 0.1, &mut r),
+            // Flush with a wall but for a hair.
+            75..=82 => {
+                let side = if i % 2 == 0 { 1.0 } else { -1.0 };
+                let at = DVec3::new(side * (3.99 - 0.1 * radius), at.y - 1.0, at.z);
+                lamp(at, DVec3::NEG_X * side, radius, 0.05, &mut r);
+            }
+            // Turned to the ceiling close by, or to the back wall.
+            83..=89 => lamp(
+                at.with_y(3.9 - radius),
+                DVec3::Y + 0.2 * any,
+                radius,
+                0.01,
+                &mut r,
+            ),
+            90..=94 => lamp(
+                at.with_z(-7.9 + 2.0 * radius),
+                DVec3::NEG_Z + 0.5 * any,
+                radius,
+                0.02,
+                &mut r,
+            ),
+            // Far away.
+            _ => lamp(
+                at.with_z(50.0 + 5.0 * at.x),
+                DVec3::NEG_Z + 0.1 * any,
+                0.4 + radius,
+                100.0,
+                &mut r,
+            ),
+        }
+    }
+    scene(&text)
+}
+
+fn direct(hall: &Scene, seed: u32) -> Settings {
+    let mut settings = settings(hall, SIZE, seed);
+    settings.light = LightParts {
+        emitted: false,
+        direct: true,
+        indirect: false,
+    };
+    settings
+}
+
+fn gpu() -> Gpu {
+    Gpu::open(&Choice::default()).expect("an adapter; scripts/test installs one")
+}
+
+#[test]
+fn the_hall_is_as_bright_as_the_reference_says() {
+    let hall = hall();
+    let mut settings = direct(&hall, 0);
+    let world = World::new(&hall, SIZE);
+    assert!(world.lights.len() > 2 * MOST_LOOKED_AT);
+    let mut engine = GpuEngine::on(gpu(), &world, &settings, None).expect("an engine");
+    let kernel = engine.kernel();
+    assert!(kernel.access == Access::Tree && kernel.wgsl.contains("LIGHT_LEVELS"));
+    let tree: Vec<_> = (0..RUNS)
+        .map(|seed| {
+            settings.seed = seed;
+            engine.reseed(seed);
+            block_means(&film(&mut engine, &settings, SAMPLES[0]), BLOCK)
+        })
+        .collect();
+    let reference: Vec<_> = (0..RUNS)
+        .map(|seed| {
+            let settings = direct(&hall, 1000 + seed);
+            let mut engine = cpu(&hall, &settings, Estimator::LightSampling);
+            block_means(&film(&mut engine, &settings, SAMPLES[1]), BLOCK)
+        })
+        .collect();
+    let worst = worst_t(&tree, &reference);
+    println!("{worst:?}");
+    let p = worst.p * worst.tests as f64;
+    assert!(p > FALSE_ALARM, "p = {p}: {worst:?}");
+}
+
+/// Places where light may be asked for: on surfaces of the hall, and anywhere with any normal, close to lamps too.
+fn receivers(world: &World, count: usize) -> Vec<[DVec3; 2]> {
+    let mut r = Numbers(7);
+    let surface = |r: &mut Numbers| {
+        let p = r.inside(HALL) - world.origin;
+        let primitive = &world.primitives[(r.next() * world.primitives.len() as f64) as usize];
+        match primitive.geometry {
+            Geometry::Plane { normal, offset } => [p - normal * (normal.dot(p) - offset), normal],
+            Geometry::Sphere { center, radius } => {
+                let n = r.direction();
+                [center + radius * n, n]
+            }
+            Geometry::Cylinder {
+                base, axis, radius, ..
+            } => {
+                let n = axis.cross(r.direction()).normalize();
+                [base + r.between(0.0, 4.0) * axis + radius * n, n]
+            }
+            _ => [p, r.direction()],
+        }
+    };
+    let place = |i: usize| match i % 4 {
+        0 | 1 => surface(&mut r),
+        2 => [r.inside(HALL) - world.origin, r.direction()],
+        _ => {
+            let l = &world.lights[(r.next() * world.lights.len() as f64) as usize];
+            let away = l.radius * r.scale(0.03, 10.0);
+            [l.center + away * r.direction(), r.direction()]
+        }
+    };
+    let rounded = |[p, n]: [DVec3; 2]| [p.as_vec3().as_dvec3(), n.as_vec3().as_dvec3()];
+    (0..count).map(place).map(rounded).collect()
+}
+
+/// Runs `body` in the hall's kernel, in which `p` and `n` are a receiver and `x[6]` to `x[8]` are free.
+fn probe(
+    gpu: &Gpu,
+    world: &World,
+    settings: &Settings,
+    body: &str,
+    inputs: &[Values],
+) -> Vec<Values> {
+    let body = format!("let p = vec3f(x[0], x[1], x[2]); let n = vec3f(x[3], x[4], x[5]);\n{body}");
+    let source = scene_probe_source(world, settings, Access::Tree, &body);
+    let probe = Probe::compile(gpu, &source, Some(Access::Tree)).expect("a probe");
+    let out = probe.run(gpu, Some(world), inputs).expect("outputs");
+    assert!(out.iter().all(|y| y[0] != UNWRITTEN), "nothing written");
+    out
+}
+
+fn input([p, n]: [DVec3; 2], rest: [f64; 3]) -> Values {
+    let mut x = Values::default();
+    let numbers = p.to_array().into_iter().chain(n.to_array()).chain(rest);
+    x.iter_mut().zip(numbers).for_each(|(x, v)| *x = v as f32);
+    x
+}
+
+/// What the tree says a light's probability is, for every light at every receiver: none is lost that can send anything there, and all
+/// together are no more than 1.
+#[test]
+fn no_light_is_lost() {
+    let (gpu, hall) = (gpu(), hall());
+    let settings = direct(&hall, 0);
+    let world = World::new(&hall, SIZE);
+    let receivers = receivers(&world, 8000);
+    let lights = world.lights.len();
+    let inputs: Vec<Values> = receivers
+        .iter()
+        .flat_map(|&at| (0..lights).map(move |i| input(at, [i as f64, 0.0, 0.0])))
+        .collect();
+    let out = probe(
+        &gpu,
+        &world,
+        &settings,
+        "y[0] = light_probability(u32(x[6]), p, n);",
+        &inputs,
+    );
+    let mut sending = 0;
+    for ([p, n], probabilities) in receivers.iter().zip(out.chunks(lights)) {
+        for (l, y) in world.lights.iter().zip(probabilities) {
+            // How far p lies before the light, and how far the light reaches above p's horizon.
+            let before = l.normal.dot(*p) - l.offset;
+            let above = n.dot(l.center - p) + l.radius * n.cross(l.normal).length();
+            let rounding = 1e-5 * (1.0 + l.center.length());
+            let sends = before > rounding && above > rounding;
+            sending += usize::from(sends);
+            let probability = f64::from(y[0]);
+            assert!(
+                (0.0..=1.0001).contains(&probability) && (probability > 0.0 || !sends),
+                "{probability}, {before} before, {above} above: {p} {n} {l:?}"
+            );
+        }
+        let sum: f64 = probabilities.iter().map(|y| f64::from(y[0])).sum();
+        assert!(sum < 1.0001, "{sum}: {p} {n}");
+    }
+    assert!(sending > inputs.len() / 5, "{sending} of {}", inputs.len());
+}
+
+/// Every light is chosen as often as is said of it, by the choice itself and to paths that meet it by chance; nothing is chosen
+/// as often as is left.
+#[test]
+fn lights_are_chosen_as_often_as_said() {
+    const TIMES: usize = 4096;
+    let (gpu, hall) = (gpu(), hall());
+    let settings = direct(&hall, 0);
+    let world = World::new(&hall, SIZE);
+    let receivers = receivers(&world, 96);
+    let lights = world.lights.len();
+    let mut r = Numbers(9);
+    let mut inputs = Vec::new();
+    for &at in &receivers {
+        inputs.extend((0..lights).map(|i| input(at, [i as f64, 0.5, 0.5])));
+        inputs.extend((0..TIMES).map(|_| input(at, [0.0, r.next(), r.next()])));
+    }
+    let body = "
+        let chosen = choose_light(p, n, vec2f(x[7], x[8]));
+        y[0] = select(f32(chosen.index), -1.0, chosen.inverse_probability == 0.0);
+        y[1] = chosen.inverse_probability * light_probability(chosen.index, p, n);
+        y[2] = light_probability(u32(x[6]), p, n);";
+    let out = probe(&gpu, &world, &settings, body, &inputs);
+    // By light, and last of all nothing: how often it was chosen, and was to be, and the variance of that.
+    let mut counts = vec![[0.0; 3]; lights + 1];
+    for (at, out) in receivers.iter().zip(out.chunks(lights + TIMES)) {
+        let (said, chosen) = out.split_at(lights);
+        let said: Vec<f64> = said.iter().map(|y| f64::from(y[2])).collect();
+        let nothing = (1.0 - said.iter().sum::<f64>()).max(0.0);
+        for ([_, expected, variance], p) in counts.iter_mut().zip(said.into_iter().chain([nothing]))
+        {
+            *expected += p * TIMES as f64;
+            *variance += p * (1.0 - p) * TIMES as f64;
+        }
+        for y in chosen {
+            let found = y[0] >= 0.0;
+            counts[if found { y[0] as usize } else { lights }][0] += 1.0;
+            assert!(!found || (y[1] - 1.0).abs() < 1e-3, "{}: {at:?}", y[1]);
+        }
+    }
+    let (rare, often): (Vec<_>, Vec<_>) = counts.into_iter().partition(|[_, e, _]| *e < 20.0);
+    let rare = rare
+        .iter()
+        .fold([0.0; 3], |a, b| [0, 1, 2].map(|k| a[k] + b[k]));
+    let all: Vec<_> = often
+        .into_iter()
+        .chain((rare[1] > 5.0).then_some(rare))
+        .collect();
+    let chi: f64 = all.iter().map(|[n, e, v]| (n - e).powi(2) / v).sum();
+    let p = ChiSquared::new(all.len() as f64).expect("positive").sf(chi);
+    println!("χ² = {chi} of {}, p = {p}", all.len());
+    assert!(
+        all.len() > lights / 2 && p > FALSE_ALARM,
+        "{chi} of {}: p = {p}",
+        all.len()
+    );
+}
