@@ -76,21 +76,57 @@ fn cap_pdf(light: DiskLight, cap: Cap, d: vec3f) -> f32 {
 }
 
 #if LIGHT_WEIGHTS
+// Half luminance, half all channels alike: by luminance alone a blue light would hardly ever be chosen.
+const LIGHT_COLORS: vec3f = vec3f(0.273, 0.5243, 0.2027);
+
+// What light is sent to.
+struct Receiver {
+    p: vec3f,
+    n: vec3f,
+#if GLOSSY_LIGHTS
+    // Where it mirrors the eye.
+    r: vec3f,
+    // How much of all light it scatters, and at most of light from r, in one unit; and an eighth of the lobe's exponent.
+    diffuse: f32,
+    specular: f32,
+    narrow: f32,
+#endif
+}
+
+#if GLOSSY_LIGHTS
+// About how much it scatters of the light of things in a ball of this radius; `to` leads to its centre, 1 / `inverse` far. At an
+// angle alpha off the lobe's axis cos^n(alpha) is about exp(-n sin^2(alpha) / 2), for which (1 + n sin^2(alpha) / 8)^-4
+// stands; over the ball it is as much flatter as it is wider.
+fn scattered(at: Receiver, to: vec3f, inverse: f32, radius: f32) -> f32 {
+    let along = dot(to, at.r) * inverse;
+    let off2 = select(1.0, fmax(1.0 - along * along, 0.0), along > 0.0);
+    let size = radius * inverse;
+    let flat = 1.0 + fmin(size * size * at.narrow, 1.0e6);
+    let wide = flat + fmin(off2 * at.narrow, 1.0e6);
+    let ratio = flat / wide;
+    return at.diffuse + at.specular * (ratio * ratio) * (ratio * ratio) / flat;
+}
+#endif
+
 // About what the light would send to a receiver at p with normal n if nothing were in between, up to a factor: the
 // irradiance of a disk far away, r^2 cos cos / d^2, with every length made longer by the radius. That keeps it finite
 // and about right near the light, keeps every light that can contribute, and costs one quotient. 0 only where the light
 // shows its back or lies below the receiver's horizon.
-fn light_weight(light: DiskLight, p: vec3f, n: vec3f) -> f32 {
+fn light_weight(light: DiskLight, at: Receiver) -> f32 {
     let r2 = light.radius * light.radius;
-    let to = light.center - p;
+    let to = light.center - at.p;
     let inverse = 1.0 / (dot(to, to) + r2);
-    let h = dot(light.normal, p) - light.offset;
-    let above = fmax(dot(n, to) + light.radius, 0.0);
-    // Half by luminance, half by all channels alike: by luminance alone a blue light would hardly ever be chosen.
-    let brightness = dot(light.radiance, vec3f(0.273, 0.5243, 0.2027));
+    let h = dot(light.normal, at.p) - light.offset;
+    let above = fmax(dot(at.n, to) + light.radius, 0.0);
+    let brightness = dot(light.radiance, LIGHT_COLORS);
     let facing = h + light.radius * (r2 * inverse);
     // Factors without unit: a compiler may take them in any order, and products of many lengths leave f32.
     let per_length = light.radius * inverse;
-    return select(0.0, brightness * (facing * per_length) * (above * per_length), h > 0.0);
+    let sent = select(0.0, brightness * (facing * per_length) * (above * per_length), h > 0.0);
+#if GLOSSY_LIGHTS
+    return sent * scattered(at, to, inverseSqrt(fmax(dot(to, to), TINY_SQUARE)), light.radius);
+#else
+    return sent;
+#endif
 }
 #endif

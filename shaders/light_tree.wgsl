@@ -23,14 +23,14 @@ fn lights_of(cluster: u32) -> vec4u {
     return record(FOUR_RECORDS + cluster - LIGHT_CLUSTERS);
 }
 
-// About what the cluster sends to a receiver with normal n at p; 0 only when none of it can.
-fn cluster_importance(c: LightCluster, p: vec3f, n: vec3f) -> f32 {
+// About what the cluster sends to a receiver; 0 only when none of it can.
+fn cluster_importance(c: LightCluster, at: Receiver) -> f32 {
     let power = length(c.power);
-    let v = p - c.center;
+    let v = at.p - c.center;
     let distance = length(v);
     // How far before the receiver's plane any of the ball lies, and p before the plane of any light: its normal is at best
     // turned from the cone's axis towards p, by the cone's half angle.
-    let receiver = c.radius - dot(n, v);
+    let receiver = c.radius - dot(at.n, v);
     let along = dot(c.power, v) / max(power, TINY);
     let turned = c.cos_cone * along + safe_sqrt((1.0 - c.cos_cone * c.cos_cone) * max(distance * distance - along * along, 0.0));
     let light = c.radius + select(turned, distance, along >= c.cos_cone * distance);
@@ -40,35 +40,38 @@ fn cluster_importance(c: LightCluster, p: vec3f, n: vec3f) -> f32 {
     let cosines = vec2f(light, receiver) * inverse;
     let dark = power == 0.0 || (far && (cosines.x < -0.002 || cosines.y < -0.002));
     let both = clamp(cosines, vec2f(0.01), vec2f(1.0));
-    let weight = power * select(1.0, both.x * both.y, far) * inverse * inverse;
+    var weight = power * select(1.0, both.x * both.y, far) * inverse * inverse;
+#if GLOSSY_LIGHTS
+    weight *= scattered(at, -v, inverse, c.radius);
+#endif
     return select(max(weight, TINY), 0.0, dark);
 }
 
 // The probability of the first half of a cluster.
-fn first_half(k: u32, p: vec3f, n: vec3f) -> f32 {
-    let a = min(cluster_importance(light_cluster(2u * k), p, n), 1.0e30);
-    let b = min(cluster_importance(light_cluster(2u * k + 1u), p, n), 1.0e30);
+fn first_half(k: u32, at: Receiver) -> f32 {
+    let a = min(cluster_importance(light_cluster(2u * k), at), 1.0e30);
+    let b = min(cluster_importance(light_cluster(2u * k + 1u), at), 1.0e30);
     let share = a / max(a + b, TINY);
     // The importance is a guess: neither half that may shine is left to less than one choice in five hundred.
     return select(share, clamp(share, 0.002, 0.998), a > 0.0 && b > 0.0);
 }
 
-fn weight_of(index: u32, p: vec3f, n: vec3f) -> f32 {
-    let weight = light_weight(light_at(select(0u, index, index != NONE)), p, n);
+fn weight_of(index: u32, at: Receiver) -> f32 {
+    let weight = light_weight(light_at(select(0u, index, index != NONE)), at);
     return select(weight, 0.0, index == NONE);
 }
 
-fn weights_of(four: vec4u, p: vec3f, n: vec3f) -> vec4f {
+fn weights_of(four: vec4u, at: Receiver) -> vec4f {
     return vec4f(
-        weight_of(four.x, p, n),
-        weight_of(four.y, p, n),
-        weight_of(four.z, p, n),
-        weight_of(four.w, p, n)
+        weight_of(four.x, at),
+        weight_of(four.y, at),
+        weight_of(four.z, at),
+        weight_of(four.w, at)
     );
 }
 
 // Two random numbers: so many levels would use up the digits of one.
-fn choose_light(p: vec3f, n: vec3f, u: vec2f) -> Chosen {
+fn choose_light(at: Receiver, u: vec2f) -> Chosen {
     var k = 1u;
     var v = u.x;
     var probability = 1.0;
@@ -76,7 +79,7 @@ fn choose_light(p: vec3f, n: vec3f, u: vec2f) -> Chosen {
         if level == LIGHT_LEVELS / 2u {
             v = u.y;
         }
-        let share = first_half(k, p, n);
+        let share = first_half(k, at);
         let first = v < share;
         let taken = select(1.0 - share, share, first);
         v = select(v - share, v, first) / max(taken, TINY);
@@ -84,31 +87,31 @@ fn choose_light(p: vec3f, n: vec3f, u: vec2f) -> Chosen {
         k = 2u * k + select(1u, 0u, first);
     }
     let four = lights_of(k);
-    let weights = weights_of(four, p, n);
+    let weights = weights_of(four, at);
     let two = weights.x + weights.y;
     let three = two + weights.z;
     let sum = three + weights.w;
-    let at = v * sum;
+    let chosen_at = v * sum;
     // The last one with any weight whose share begins at or below it.
     var found = four.x;
     var chosen = weights.x;
-    let second = weights.y > 0.0 && (at >= weights.x || chosen == 0.0);
+    let second = weights.y > 0.0 && (chosen_at >= weights.x || chosen == 0.0);
     found = select(found, four.y, second);
     chosen = select(chosen, weights.y, second);
-    let third = weights.z > 0.0 && (at >= two || chosen == 0.0);
+    let third = weights.z > 0.0 && (chosen_at >= two || chosen == 0.0);
     found = select(found, four.z, third);
     chosen = select(chosen, weights.z, third);
-    let fourth = weights.w > 0.0 && (at >= three || chosen == 0.0);
+    let fourth = weights.w > 0.0 && (chosen_at >= three || chosen == 0.0);
     found = select(found, four.w, fourth);
     chosen = select(chosen, weights.w, fourth);
     let index = select(0u, found, found != NONE);
     let light = light_at(index);
     probability *= chosen;
-    return Chosen(light, index, cap_of(light, p), select(sum / max(probability, TINY), 0.0, probability <= 0.0), 1.0);
+    return Chosen(light, index, cap_of(light, at.p), select(sum / max(probability, TINY), 0.0, probability <= 0.0), 1.0);
 }
 
 // The probability with which choose_light takes a light.
-fn light_probability(index: u32, p: vec3f, n: vec3f) -> f32 {
+fn light_probability(index: u32, at: Receiver) -> f32 {
     let places = record(PLACE_RECORDS + index / 4u);
     let place = select(
         select(places.x, places.y, index % 4u == 1u),
@@ -118,11 +121,11 @@ fn light_probability(index: u32, p: vec3f, n: vec3f) -> f32 {
     let cluster = LIGHT_CLUSTERS + place / 4u;
     var probability = 1.0;
     for (var level = LIGHT_LEVELS; level > 0u; level--) {
-        let share = first_half(cluster >> level, p, n);
+        let share = first_half(cluster >> level, at);
         let second = (cluster >> (level - 1u)) & 1u;
         probability *= select(share, 1.0 - share, second == 1u);
     }
-    let weights = weights_of(lights_of(cluster), p, n);
+    let weights = weights_of(lights_of(cluster), at);
     let sum = weights.x + weights.y + weights.z + weights.w;
-    return probability * weight_of(index, p, n) / max(sum, TINY);
+    return probability * weight_of(index, at) / max(sum, TINY);
 }

@@ -61,8 +61,8 @@ struct Path {
     // Density of the last scattering, per solid angle; 0: light met by chance is all counted by light sampling.
     pdf: f32,
 #if SEVERAL_LIGHTS
-    // Normal there, and the sum of the light weights.
-    n: vec3f,
+    // What light was sent to there, and the sum of the light weights.
+    receiver: Receiver,
     weights: f32,
 #endif
 #endif

@@ -29,10 +29,10 @@ fn emission(path: Path, hit: Hit) -> vec3f {
         let cap = cap_of(light, path.ray.o);
         var pdf = cap_pdf(light, cap, path.ray.d);
 #if LIGHT_TREE
-        pdf *= light_probability(hit.key >> 2u, path.ray.o, path.n);
+        pdf *= light_probability(hit.key >> 2u, path.receiver);
 #else
 #if SEVERAL_LIGHTS
-        pdf *= light_weight(light, path.ray.o, path.n) / fmax(path.weights, TINY);
+        pdf *= light_weight(light, path.receiver) / fmax(path.weights, TINY);
 #endif
 #endif
         share *= power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * pdf);
@@ -94,6 +94,19 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         u = draw_spread(u, draw_key.x, round % REPLICATES, i, draw_key.w);
     }
 
+#if LIGHT_WEIGHTS
+#if GLOSSY_LIGHTS
+    var receiver = Receiver(v.p, n, mirrored(d, n), 1.0, 0.0, 0.0);
+    if material.kind == MATERIAL_PHONG {
+        let shares = vec2f(dot(material.color, LIGHT_COLORS), dot(material.specular, LIGHT_COLORS));
+        receiver.diffuse = shares.x;
+        receiver.specular = shares.y * (0.5 * material.exponent + 1.0);
+        receiver.narrow = 0.125 * material.exponent;
+    }
+#else
+    let receiver = Receiver(v.p, n);
+#endif
+#endif
 #if LIGHT_SAMPLING
     // Direct light, where the surface scatters into more than one direction.
     var weights = 0.0;
@@ -123,9 +136,13 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
 #endif
 #if LIGHT_TREE
-            let chosen = choose_light(v.p, n, vec2f(choice, spare));
+            let chosen = choose_light(receiver, vec2f(choice, spare));
 #else
-            let chosen = choose_light(v.p, n, choice);
+#if LIGHT_WEIGHTS
+            let chosen = choose_light(receiver, choice);
+#else
+            let chosen = choose_light(v.p, choice);
+#endif
 #endif
             weights = chosen.weights;
             let to = sample_cap(chosen.light, chosen.cap, points);
@@ -264,7 +281,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     (*path).ray = Ray(v.p, next, face, medium, NO_FACE);
 #if MIS
 #if SEVERAL_LIGHTS
-    (*path).n = n;
+    (*path).receiver = receiver;
     (*path).weights = weights;
 #endif
 #endif

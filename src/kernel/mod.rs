@@ -362,12 +362,14 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
         "LIGHT_TREE",
         sampling && access == Access::Tree && records::clustered(world),
     );
-    set("SEVERAL_LIGHTS", sampling && world.lights.len() > 1);
+    let several = sampling && world.lights.len() > 1;
+    set("SEVERAL_LIGHTS", several);
+    set("GLOSSY_LIGHTS", several && phong);
     let images = !images::of(world, settings, access).is_empty();
     set("IMAGES", images);
     set(
         "LIGHT_WEIGHTS",
-        images || sampling && world.lights.len() > 1,
+        images || several,
     );
     set(
         "EXTREME_LIGHTS",
