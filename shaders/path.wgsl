@@ -133,11 +133,16 @@ fn glances_at(pixel: vec2u) -> u32 {
 
 @compute @workgroup_size(64)
 fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let index = (params.first_group + group.x) * params.stride % params.groups * 64u + lane;
-    if index >= params.pixels {
+    // A workgroup is a block of 8 x 8 pixels, and its lanes fill it in squares of 4 x 4 and halves of 8 x 4: however many a
+    // device takes side by side, their rays go the same way for longer than those of a row.
+    let block = (params.first_group + group.x) * params.stride % params.groups;
+    let across = (params.size.x + 7u) / 8u;
+    let texel = 8u * vec2u(block % across, block / across)
+        + vec2u((lane & 3u) | ((lane >> 2u) & 4u), ((lane >> 2u) & 3u) | ((lane >> 3u) & 4u));
+    if any(texel >= params.size) {
         return;
     }
-    let texel = vec2u(index % params.size.x, index / params.size.x);
+    let index = texel.y * params.size.x + texel.x;
     let pixel = params.tile + texel;
     let key = pixel.x | (pixel.y << 16u);
 

@@ -232,7 +232,7 @@ fn receivers(world: &World, count: usize) -> Vec<[DVec3; 2]> {
     (0..count).map(place).map(rounded).collect()
 }
 
-/// Runs `body` in the hall's kernel, in which `p` and `n` are a receiver and `x[6]` to `x[8]` are free.
+/// Runs `body` in the hall's kernel, in which `at` is a receiver and `x[6]` to `x[8]` are free.
 fn probe(
     gpu: &Gpu,
     world: &World,
@@ -240,7 +240,10 @@ fn probe(
     body: &str,
     inputs: &[Values],
 ) -> Vec<Values> {
-    let body = format!("let p = vec3f(x[0], x[1], x[2]); let n = vec3f(x[3], x[4], x[5]);\n{body}");
+    let body = format!(
+        "let at = Receiver(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), vec3f(x[9], x[10], x[11]), x[12], x[13], x[14]);
+        {body}"
+    );
     let source = scene_probe_source(world, settings, Access::Tree, &body);
     let probe = Probe::compile(gpu, &source, Some(Access::Tree)).expect("a probe");
     let out = probe.run(gpu, Some(world), inputs).expect("outputs");
@@ -248,9 +251,32 @@ fn probe(
     out
 }
 
-fn input([p, n]: [DVec3; 2], rest: [f64; 3]) -> Values {
+/// How a receiver scatters: where it mirrors the eye, its diffuse and specular shares, an eighth of its exponent. Two in five are
+/// diffuse, the others glossy, from dull to almost a mirror, of which a third are nothing but that.
+fn gloss([p, n]: [DVec3; 2]) -> [f64; 6] {
+    let mut r = Numbers(p.x.to_bits() ^ p.z.to_bits().rotate_left(21));
+    let (kind, share) = ([(); 4].map(|()| r.next())[3], r.next());
+    let d = r.direction();
+    let [x, y, z] = (d - n * (2.0 * d.dot(n)).min(0.0)).to_array();
+    if kind < 0.4 {
+        return [x, y, z, 1.0, 0.0, 0.0];
+    }
+    let exponent = r.scale(1.0, 1e4);
+    let diffuse = if kind < 0.6 { 0.0 } else { 0.5 * share };
+    [
+        x,
+        y,
+        z,
+        diffuse,
+        (0.9 - diffuse) * (0.5 * exponent + 1.0),
+        0.125 * exponent,
+    ]
+}
+
+fn input(at: [DVec3; 2], rest: [f64; 3]) -> Values {
     let mut x = Values::default();
-    let numbers = p.to_array().into_iter().chain(n.to_array()).chain(rest);
+    let [p, n] = at.map(|v| v.to_array());
+    let numbers = p.into_iter().chain(n).chain(rest).chain(gloss(at));
     x.iter_mut().zip(numbers).for_each(|(x, v)| *x = v as f32);
     x
 }
@@ -272,7 +298,7 @@ fn no_light_is_lost() {
         &gpu,
         &world,
         &settings,
-        "y[0] = light_probability(u32(x[6]), p, n);",
+        "y[0] = light_probability(u32(x[6]), at);",
         &inputs,
     );
     let mut sending = 0;
@@ -313,10 +339,10 @@ fn lights_are_chosen_as_often_as_said() {
         inputs.extend((0..TIMES).map(|_| input(at, [0.0, r.next(), r.next()])));
     }
     let body = "
-        let chosen = choose_light(p, n, vec2f(x[7], x[8]));
+        let chosen = choose_light(at, vec2f(x[7], x[8]));
         y[0] = select(f32(chosen.index), -1.0, chosen.inverse_probability == 0.0);
-        y[1] = chosen.inverse_probability * light_probability(chosen.index, p, n);
-        y[2] = light_probability(u32(x[6]), p, n);";
+        y[1] = chosen.inverse_probability * light_probability(chosen.index, at);
+        y[2] = light_probability(u32(x[6]), at);";
     let out = probe(&gpu, &world, &settings, body, &inputs);
     // By light, and last of all nothing: how often it was chosen, and was to be, and the variance of that.
     let mut counts = vec![[0.0; 3]; lights + 1];

@@ -153,8 +153,7 @@ impl Film {
         let (bounds, columns) = (self.bounds, rect.x0..rect.x1);
         let width = bounds.width() as usize;
         let rows = (rect.y0 - bounds.y0) as usize * width..(rect.y1 - bounds.y0) as usize * width;
-        let across =
-            (columns.start - bounds.x0) as usize..(columns.end - bounds.x0) as usize;
+        let across = (columns.start - bounds.x0) as usize..(columns.end - bounds.x0) as usize;
         // A fast GPU makes a block in less time than one thread takes to fold it.
         let sums = self.sums[rows.clone()].par_chunks_mut(width);
         let of_row = |y: usize| columns.clone().map(move |x| (x, rect.y0 + y as u32));
@@ -167,7 +166,9 @@ impl Film {
         } else {
             let partial = self.partial[rows].par_chunks_mut(width);
             (sums.zip(partial).enumerate()).for_each(|(y, (sums, partial))| {
-                let pixels = sums[across.clone()].iter_mut().zip(&mut partial[across.clone()]);
+                let pixels = sums[across.clone()]
+                    .iter_mut()
+                    .zip(&mut partial[across.clone()]);
                 for ((sums, partial), (x, y)) in pixels.zip(of_row(y)) {
                     let new = running(x, y);
                     if fresh {

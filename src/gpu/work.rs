@@ -1,12 +1,15 @@
 //! What a call makes of the pixels of a tile, and how it is shared among workgroups and submissions.
 
-use super::adapters::WORKGROUP;
 use crate::engine::Part;
 use crate::film::coverage::Rect;
 use std::ops::Range;
 
+/// Pixels along an edge of the block that a workgroup is: what `shaders/path.wgsl` says.
+const BLOCK_SIDE: u32 = 8;
+
 /// The samples that each pixel of a tile is to have.
 pub(super) struct Work {
+    tile: Rect,
     /// Rows of the tile.
     pixels: Vec<Range<u32>>,
     /// The most samples of any pixel.
@@ -27,6 +30,7 @@ impl Work {
         }
         let samples = parts.iter().map(|p| p.samples.end - p.samples.start);
         Self {
+            tile,
             pixels,
             longest: samples.max().unwrap_or(0),
         }
@@ -42,11 +46,18 @@ impl Work {
     /// each has had `done`.
     pub fn paths(&self, done: u64, most: u64) -> Vec<u64> {
         let of = |r: &Range<u32>| u64::from(r.end - r.start).saturating_sub(done).min(most);
-        let groups: Vec<u64> = self
-            .pixels
-            .chunks(WORKGROUP as usize)
-            .map(|group| group.iter().map(of).sum())
-            .collect();
+        let width = self.tile.width() as usize;
+        let side = BLOCK_SIDE as usize;
+        let mut groups: Vec<u64> = Vec::with_capacity(workgroups(self.tile) as usize);
+        for rows in self.pixels.chunks(side * width) {
+            let first = groups.len();
+            groups.resize(first + width.div_ceil(side), 0);
+            for row in rows.chunks(width) {
+                for (group, pixels) in groups[first..].iter_mut().zip(row.chunks(side)) {
+                    *group += pixels.iter().map(of).sum::<u64>();
+                }
+            }
+        }
         let n = groups.len() as u64;
         let stride = u64::from(coprime_stride(n as u32));
         (0..n).map(|k| groups[(k * stride % n) as usize]).collect()
@@ -55,7 +66,7 @@ impl Work {
 
 /// Workgroups that cover `rect`.
 pub(super) fn workgroups(rect: Rect) -> u32 {
-    (rect.area() as u32).div_ceil(WORKGROUP)
+    rect.width().div_ceil(BLOCK_SIDE) * rect.height().div_ceil(BLOCK_SIDE)
 }
 
 /// About 0.618 of `groups`, and without a common divisor with it: steps of this visit every group once.
@@ -117,8 +128,12 @@ mod tests {
             samples: 0..u64::from(y),
         });
         let mut paths = Work::new(tile, &rows.collect::<Vec<_>>()).paths(0, 1000);
-        assert!(paths[0] == 0 && paths[1] > 64, "far apart");
+        assert!(paths[0] == 8 * 28 && paths[1] > 2 * paths[0], "far apart");
         paths.sort();
-        assert!((0..50).map(|y| 64 * y).eq(paths));
+        // Eight blocks side by side, of eight rows each but the last two rows'.
+        let rows = |k: u64| (8 * k..50.min(8 * k + 8)).sum::<u64>();
+        let mut expected: Vec<u64> = (0..7).flat_map(|k| [8 * rows(k); 8]).collect();
+        expected.sort();
+        assert_eq!(paths, expected);
     }
 }

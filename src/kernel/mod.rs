@@ -367,10 +367,7 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
     set("GLOSSY_LIGHTS", several && phong);
     let images = !images::of(world, settings, access).is_empty();
     set("IMAGES", images);
-    set(
-        "LIGHT_WEIGHTS",
-        images || several,
-    );
+    set("LIGHT_WEIGHTS", images || several);
     set(
         "EXTREME_LIGHTS",
         world

@@ -71,7 +71,11 @@ pub(super) fn choose_unit(scene: &Scene, origin: DVec3) -> f64 {
             greatest = greatest.max(normal.dot(point - origin).abs());
         }
     }
-    if least > greatest || [least, greatest].iter().all(|x| ORDINARY_LENGTHS.contains(x)) {
+    if least > greatest
+        || [least, greatest]
+            .iter()
+            .all(|x| ORDINARY_LENGTHS.contains(x))
+    {
         return 1.0;
     }
     (0.5 * (least.log2() + greatest.log2())).round().exp2()
