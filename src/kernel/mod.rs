@@ -35,9 +35,6 @@ const ORDINARY_RADII: RangeInclusive<f64> = 1e-8..=1e8;
 /// Glances at more surfaces would use up the loop trips that an older driver grants.
 const MOST_GLANCED_AT: u64 = 500;
 
-/// Vertices that a path keeps for certain before roulette may end it.
-const ROULETTE_DEPTH: u32 = 5;
-
 /// Tags of [`Bsdf`] in `Material.kind`; the names are the kernel's constants.
 pub(crate) const MATERIAL_TAGS: [&str; 4] = [
     "MATERIAL_DIFFUSE",
@@ -444,7 +441,6 @@ fn constants(world: &World, settings: &Settings) -> String {
     constant("ROUND_SAMPLES", "u32", format!("{}u", settings.round()));
     constant("SHADOW_RAYS", "f32", float(f64::from(settings.shadow_rays)));
     constant("LAST_DEPTH", "u32", format!("{}u", last_depth(settings)));
-    constant("ROULETTE_DEPTH", "u32", format!("{ROULETTE_DEPTH}u"));
     if settings.light != LightParts::ALL {
         constant("KEEP_EMITTED", "bool", settings.light.emitted.to_string());
         constant("KEEP_DIRECT", "bool", settings.light.direct.to_string());
