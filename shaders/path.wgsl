@@ -45,6 +45,8 @@ struct Path {
     ray: Ray,
     // Product of the sample weights so far.
     beta: vec3f,
+    // Its greatest channel at the first vertex that scattered in more than one direction, or the last before it.
+    shown: f32,
     // Radiance gathered so far.
     radiance: vec3f,
     // Number of the vertex that `ray` will meet; the first has 1.

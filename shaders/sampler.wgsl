@@ -40,8 +40,8 @@ fn draw(key: vec4u) -> Draws {
 }
 
 // The same for the first vertex that scatters into more than one direction: light choice and point from the additive
-// recurrence of the plastic ratio's kin [Roberts2018], direction from the first two dimensions of Sobol's sequence
-// [Burley2020]. Both run through the samples i of one replicate; a shift of its own, modulo 1 and digit by digit, makes
+// recurrence of the plastic ratio's kin [Roberts2018], the lobe of a glossy surface from the golden ratio's, direction from the
+// first two dimensions of Sobol's sequence [Burley2020]. All run through the samples i of one replicate; a shift of its own, modulo 1 and digit by digit, makes
 // every sample uniform and the replicates independent.
 fn draw_spread(u: Draws, pixel: u32, replicate: u32, i: u32, seed: u32) -> Draws {
     let shift = hash_pixel(pixel, replicate, seed ^ 0x5bd1e995u);
@@ -55,8 +55,14 @@ fn draw_spread(u: Draws, pixel: u32, replicate: u32, i: u32, seed: u32) -> Draws
     y ^= (y & 0x55555555u) << 1u;
     let direction = vec2u(x, y) ^ more;
     let points = unit_float(vec4u(light.yz, direction));
+#if PHONG
+    let lobe = ((more.y ^ (more.y >> 15u)) * 0x2c1b3c6du) + i * 0x9e3779b9u;
+    let choices = unit_float(vec4u(light.x, lobe, 0u, 0u));
+    return Draws(points, vec4f(choices.xy, u.choices.zw));
+#else
     let choice = unit_float(light.xxxx).x;
     return Draws(points, vec4f(choice, u.choices.yzw));
+#endif
 }
 
 // Two words for the place in a pixel, which asks for less than light does: few multiplications, for every one of them is

@@ -13,8 +13,8 @@ use crate::settings::Integrator;
 use crate::world::WorldPrimitive;
 use glam::DVec3;
 
-/// The throughput below which a path may be ended by chance.
-const LITTLE: f64 = 0.5;
+/// The first vertex at which a path may be ended by chance: short paths are cheap, and roulette adds noise.
+const FIRST_ROULETTE: u32 = 5;
 
 /// The most likely that a path survives roulette: light caught between perfect reflectors ends, too.
 const MOST_LIKELY: f64 = 0.999;
@@ -110,7 +110,11 @@ impl Tracer {
             };
             throughput *= scattered.weight;
             index_ratio *= scattered.index_ratio;
-            let survival = (throughput.max_element() / LITTLE).min(MOST_LIKELY);
+            let survival = if vertex < FIRST_ROULETTE {
+                1.0
+            } else {
+                throughput.max_element().min(MOST_LIKELY)
+            };
             if throughput == DVec3::ZERO || u[3] >= survival {
                 break;
             }
