@@ -45,7 +45,7 @@ struct Path {
     ray: Ray,
     // Product of the sample weights so far.
     beta: vec3f,
-    // Its greatest channel at the first vertex that scattered in more than one direction, or the last before it.
+    // Its greatest channel at the first vertex that scattered in more than one direction; 1 before.
     shown: f32,
     // Radiance gathered so far.
     radiance: vec3f,
@@ -85,6 +85,7 @@ struct Path {
 fn begin(glances: u32) -> Path {
     var path: Path;
     path.beta = vec3f(1.0);
+    path.shown = 1.0;
     path.radiance = vec3f(0.0);
     path.depth = 1u;
     path.specular = true;

@@ -296,15 +296,15 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     (*path).weights = weights;
 #endif
 #endif
-    let shown = (*path).clear;
-    (*path).clear = shown && (*path).specular;
+    let clear = (*path).clear;
+    (*path).clear = clear && (*path).specular;
 #if IMAGES
     (*path).clear = (*path).clear && (*path).memory < SENT;
 #endif
     // Russian roulette: paths that carry little beside what the pixel shows, which is in proportion to their weight where they
-    // first scattered in more than one direction. A dark thing in a bright room is no noisier so than a bright one.
+    // first scatter in more than one direction. A dark thing in a bright room is no noisier so than a bright one.
     let brightest = fmax(fmax(beta.x, beta.y), beta.z);
-    if shown {
+    if clear && !(*path).clear {
         (*path).shown = brightest;
     }
     var survival = fmin(1.0, brightest / fmax(LITTLE * (*path).shown, TINY));
