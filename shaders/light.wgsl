@@ -79,9 +79,8 @@ fn cap_pdf(light: DiskLight, cap: Cap, d: vec3f) -> f32 {
 // Half luminance, half all channels alike: by luminance alone a blue light would hardly ever be chosen.
 const LIGHT_COLORS: vec3f = vec3f(0.273, 0.5243, 0.2027);
 
-// What light is sent to.
+// What light is sent to at some point: its normal there, and how it scatters.
 struct Receiver {
-    p: vec3f,
     n: vec3f,
 #if GLOSSY_LIGHTS
     // Where it mirrors the eye.
@@ -112,11 +111,11 @@ fn scattered(at: Receiver, to: vec3f, inverse: f32, radius: f32) -> f32 {
 // irradiance of a disk far away, r^2 cos cos / d^2, with every length made longer by the radius. That keeps it finite
 // and about right near the light, keeps every light that can contribute, and costs one quotient. 0 only where the light
 // shows its back or lies below the receiver's horizon.
-fn light_weight(light: DiskLight, at: Receiver) -> f32 {
+fn light_weight(light: DiskLight, p: vec3f, at: Receiver) -> f32 {
     let r2 = light.radius * light.radius;
-    let to = light.center - at.p;
+    let to = light.center - p;
     let inverse = 1.0 / (dot(to, to) + r2);
-    let h = dot(light.normal, at.p) - light.offset;
+    let h = dot(light.normal, p) - light.offset;
     let above = fmax(dot(at.n, to) + light.radius, 0.0);
     let brightness = dot(light.radiance, LIGHT_COLORS);
     let facing = h + light.radius * (r2 * inverse);

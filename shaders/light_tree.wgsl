@@ -23,10 +23,10 @@ fn lights_of(cluster: u32) -> vec4u {
     return record(FOUR_RECORDS + cluster - LIGHT_CLUSTERS);
 }
 
-// About what the cluster sends to a receiver; 0 only when none of it can.
-fn cluster_importance(c: LightCluster, at: Receiver) -> f32 {
+// About what the cluster sends to a receiver at p; 0 only when none of it can.
+fn cluster_importance(c: LightCluster, p: vec3f, at: Receiver) -> f32 {
     let power = length(c.power);
-    let v = at.p - c.center;
+    let v = p - c.center;
     let distance = length(v);
     // How far before the receiver's plane any of the ball lies, and p before the plane of any light: its normal is at best
     // turned from the cone's axis towards p, by the cone's half angle.
@@ -48,30 +48,30 @@ fn cluster_importance(c: LightCluster, at: Receiver) -> f32 {
 }
 
 // The probability of the first half of a cluster.
-fn first_half(k: u32, at: Receiver) -> f32 {
-    let a = min(cluster_importance(light_cluster(2u * k), at), 1.0e30);
-    let b = min(cluster_importance(light_cluster(2u * k + 1u), at), 1.0e30);
+fn first_half(k: u32, p: vec3f, at: Receiver) -> f32 {
+    let a = min(cluster_importance(light_cluster(2u * k), p, at), 1.0e30);
+    let b = min(cluster_importance(light_cluster(2u * k + 1u), p, at), 1.0e30);
     let share = a / max(a + b, TINY);
     // The importance is a guess: neither half that may shine is left to less than one choice in five hundred.
     return select(share, clamp(share, 0.002, 0.998), a > 0.0 && b > 0.0);
 }
 
-fn weight_of(index: u32, at: Receiver) -> f32 {
-    let weight = light_weight(light_at(select(0u, index, index != NONE)), at);
+fn weight_of(index: u32, p: vec3f, at: Receiver) -> f32 {
+    let weight = light_weight(light_at(select(0u, index, index != NONE)), p, at);
     return select(weight, 0.0, index == NONE);
 }
 
-fn weights_of(four: vec4u, at: Receiver) -> vec4f {
+fn weights_of(four: vec4u, p: vec3f, at: Receiver) -> vec4f {
     return vec4f(
-        weight_of(four.x, at),
-        weight_of(four.y, at),
-        weight_of(four.z, at),
-        weight_of(four.w, at)
+        weight_of(four.x, p, at),
+        weight_of(four.y, p, at),
+        weight_of(four.z, p, at),
+        weight_of(four.w, p, at)
     );
 }
 
 // Two random numbers: so many levels would use up the digits of one.
-fn choose_light(at: Receiver, u: vec2f) -> Chosen {
+fn choose_light(p: vec3f, at: Receiver, u: vec2f) -> Chosen {
     var k = 1u;
     var v = u.x;
     var probability = 1.0;
@@ -79,7 +79,7 @@ fn choose_light(at: Receiver, u: vec2f) -> Chosen {
         if level == LIGHT_LEVELS / 2u {
             v = u.y;
         }
-        let share = first_half(k, at);
+        let share = first_half(k, p, at);
         let first = v < share;
         let taken = select(1.0 - share, share, first);
         v = select(v - share, v, first) / max(taken, TINY);
@@ -87,7 +87,7 @@ fn choose_light(at: Receiver, u: vec2f) -> Chosen {
         k = 2u * k + select(1u, 0u, first);
     }
     let four = lights_of(k);
-    let weights = weights_of(four, at);
+    let weights = weights_of(four, p, at);
     let two = weights.x + weights.y;
     let three = two + weights.z;
     let sum = three + weights.w;
@@ -107,11 +107,11 @@ fn choose_light(at: Receiver, u: vec2f) -> Chosen {
     let index = select(0u, found, found != NONE);
     let light = light_at(index);
     probability *= chosen;
-    return Chosen(light, index, cap_of(light, at.p), select(sum / max(probability, TINY), 0.0, probability <= 0.0), 1.0);
+    return Chosen(light, index, cap_of(light, p), select(sum / max(probability, TINY), 0.0, probability <= 0.0), 1.0);
 }
 
 // The probability with which choose_light takes a light.
-fn light_probability(index: u32, at: Receiver) -> f32 {
+fn light_probability(index: u32, p: vec3f, at: Receiver) -> f32 {
     let places = record(PLACE_RECORDS + index / 4u);
     let place = select(
         select(places.x, places.y, index % 4u == 1u),
@@ -121,11 +121,11 @@ fn light_probability(index: u32, at: Receiver) -> f32 {
     let cluster = LIGHT_CLUSTERS + place / 4u;
     var probability = 1.0;
     for (var level = LIGHT_LEVELS; level > 0u; level--) {
-        let share = first_half(cluster >> level, at);
+        let share = first_half(cluster >> level, p, at);
         let second = (cluster >> (level - 1u)) & 1u;
         probability *= select(share, 1.0 - share, second == 1u);
     }
-    let weights = weights_of(lights_of(cluster), at);
+    let weights = weights_of(lights_of(cluster), p, at);
     let sum = weights.x + weights.y + weights.z + weights.w;
-    return probability * weight_of(index, at) / max(sum, TINY);
+    return probability * weight_of(index, p, at) / max(sum, TINY);
 }

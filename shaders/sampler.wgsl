@@ -40,9 +40,9 @@ fn draw(key: vec4u) -> Draws {
 }
 
 // The same for the first vertex that scatters into more than one direction: light choice and point from the additive
-// recurrence of the plastic ratio's kin [Roberts2018], the lobe of a glossy surface from the golden ratio's, direction from the
-// first two dimensions of Sobol's sequence [Burley2020]. All run through the samples i of one replicate; a shift of its own, modulo 1 and digit by digit, makes
-// every sample uniform and the replicates independent.
+// recurrence of the plastic ratio's kin [Roberts2018], the lobe of a glossy surface from the golden ratio's, direction
+// from the first two dimensions of Sobol's sequence [Burley2020]. All run through the samples i of one replicate; a
+// shift of its own, modulo 1 and digit by digit, makes every sample uniform and the replicates independent.
 fn draw_spread(u: Draws, pixel: u32, replicate: u32, i: u32, seed: u32) -> Draws {
     let shift = hash_pixel(pixel, replicate, seed ^ 0x5bd1e995u);
     let more = (shift ^ (shift >> vec2u(16u))) * 0x9e3779b1u;

@@ -29,10 +29,10 @@ fn emission(path: Path, hit: Hit) -> vec3f {
         let cap = cap_of(light, path.ray.o);
         var pdf = cap_pdf(light, cap, path.ray.d);
 #if LIGHT_TREE
-        pdf *= light_probability(hit.key >> 2u, path.receiver);
+        pdf *= light_probability(hit.key >> 2u, path.ray.o, path.receiver);
 #else
 #if SEVERAL_LIGHTS
-        pdf *= light_weight(light, path.receiver) / fmax(path.weights, TINY);
+        pdf *= light_weight(light, path.ray.o, path.receiver) / fmax(path.weights, TINY);
 #endif
 #endif
         share *= power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * pdf);
@@ -107,7 +107,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 
 #if LIGHT_WEIGHTS
 #if GLOSSY_LIGHTS
-    var receiver = Receiver(v.p, n, mirrored(d, n), 1.0, 0.0, 0.0);
+    var receiver = Receiver(n, mirrored(d, n), 1.0, 0.0, 0.0);
     if material.kind == MATERIAL_PHONG {
         let shares = vec2f(dot(material.color, LIGHT_COLORS), dot(material.specular, LIGHT_COLORS));
         receiver.diffuse = shares.x;
@@ -115,7 +115,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         receiver.narrow = 0.125 * material.exponent;
     }
 #else
-    let receiver = Receiver(v.p, n);
+    let receiver = Receiver(n);
 #endif
 #endif
 #if LIGHT_SAMPLING
@@ -147,10 +147,10 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
 #endif
 #if LIGHT_TREE
-            let chosen = choose_light(receiver, vec2f(choice, spare));
+            let chosen = choose_light(v.p, receiver, vec2f(choice, spare));
 #else
 #if LIGHT_WEIGHTS
-            let chosen = choose_light(receiver, choice);
+            let chosen = choose_light(v.p, receiver, choice);
 #else
             let chosen = choose_light(v.p, choice);
 #endif

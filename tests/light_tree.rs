@@ -20,7 +20,7 @@
 mod common;
 
 use common::{block_means, cpu, film, scene, settings, worst_t};
-use etendue::gpu::probe::{Probe, UNWRITTEN, Values};
+use etendue::gpu::probe::{Probe, UNWRITTEN, Uniform, Values};
 use etendue::gpu::{Choice, Gpu, GpuEngine};
 use etendue::kernel::{Access, MOST_LOOKED_AT, scene_probe_source};
 use etendue::reference::Estimator;
@@ -39,36 +39,19 @@ const RUNS: u32 = 16;
 /// Samples a run, on the GPU and of the reference.
 const SAMPLES: [u64; 2] = [512, 512];
 
-/// Deterministic uniform numbers.
-struct Numbers(u64);
+/// With an evenly distributed logarithm.
+fn scale(r: &mut Uniform, a: f64, b: f64) -> f64 {
+    a * (b / a).powf(r.next())
+}
 
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / (1u64 << 24) as f64
-    }
+fn inside(r: &mut Uniform, [low, high]: [[f64; 3]; 2]) -> DVec3 {
+    DVec3::from_array([0, 1, 2].map(|k| r.between(low[k], high[k])))
+}
 
-    fn between(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.next()
-    }
-
-    /// With an evenly distributed logarithm.
-    fn scale(&mut self, a: f64, b: f64) -> f64 {
-        a * (b / a).powf(self.next())
-    }
-
-    fn inside(&mut self, [low, high]: [[f64; 3]; 2]) -> DVec3 {
-        DVec3::from_array([0, 1, 2].map(|k| self.between(low[k], high[k])))
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let (z, turn) = (self.between(-1.0, 1.0), TAU * self.next());
-        let across = (1.0 - z * z).sqrt();
-        DVec3::new(across * turn.cos(), across * turn.sin(), z)
-    }
+fn direction(r: &mut Uniform) -> DVec3 {
+    let (z, turn) = (r.between(-1.0, 1.0), TAU * r.next());
+    let across = (1.0 - z * z).sqrt();
+    DVec3::new(across * turn.cos(), across * turn.sin(), z)
 }
 
 /// The inside of the hall, which is open behind the camera.
@@ -101,10 +84,10 @@ fn hall() -> Scene {
             z - 1.0
         );
     }
-    let mut r = Numbers(5);
-    let mut lamp = |center: DVec3, normal: DVec3, radius: f64, power: f64, r: &mut Numbers| {
+    let mut r = Uniform(5);
+    let mut lamp = |center: DVec3, normal: DVec3, radius: f64, power: f64, r: &mut Uniform| {
         let hue = [0.0, 1.0, 2.0].map(|k| 0.1 + (0.5 + 0.5 * (TAU * k / 3.0 + 9.0 * power).cos()));
-        let [red, green, blue] = hue.map(|c| c * power * r.scale(0.3, 3.0) / (radius * radius));
+        let [red, green, blue] = hue.map(|c| c * power * scale(r, 0.3, 3.0) / (radius * radius));
         text += &format!(
             "[[light]]\ncenter = {:?}\nnormal = {:?}\nradius = {radius}\nradiance = [{red}, {green}, {blue}]\n",
             center.to_array(),
@@ -113,9 +96,9 @@ fn hall() -> Scene {
     };
     let air = [[-3.6, 2.3, -7.0], [3.6, 3.5, 4.0]];
     for i in 0..100 {
-        let radius = r.scale(0.03, 0.25);
-        let at = r.inside(air);
-        let any = r.direction();
+        let radius = scale(&mut r, 0.03, 0.25);
+        let at = inside(&mut r, air);
+        let any = direction(&mut r);
         let down = DVec3::NEG_Y + 0.8 * any;
         match i {
             // Hanging, each turned its own way, and not so few turned up.
@@ -200,32 +183,32 @@ fn the_hall_is_as_bright_as_the_reference_says() {
 
 /// Places where light may be asked for: on surfaces of the hall, and anywhere with any normal, close to lamps too.
 fn receivers(world: &World, count: usize) -> Vec<[DVec3; 2]> {
-    let mut r = Numbers(7);
-    let surface = |r: &mut Numbers| {
-        let p = r.inside(HALL) - world.origin;
+    let mut r = Uniform(7);
+    let surface = |r: &mut Uniform| {
+        let p = inside(r, HALL) - world.origin;
         let primitive = &world.primitives[(r.next() * world.primitives.len() as f64) as usize];
         match primitive.geometry {
             Geometry::Plane { normal, offset } => [p - normal * (normal.dot(p) - offset), normal],
             Geometry::Sphere { center, radius } => {
-                let n = r.direction();
+                let n = direction(r);
                 [center + radius * n, n]
             }
             Geometry::Cylinder {
                 base, axis, radius, ..
             } => {
-                let n = axis.cross(r.direction()).normalize();
+                let n = axis.cross(direction(r)).normalize();
                 [base + r.between(0.0, 4.0) * axis + radius * n, n]
             }
-            _ => [p, r.direction()],
+            _ => [p, direction(r)],
         }
     };
     let place = |i: usize| match i % 4 {
         0 | 1 => surface(&mut r),
-        2 => [r.inside(HALL) - world.origin, r.direction()],
+        2 => [inside(&mut r, HALL) - world.origin, direction(&mut r)],
         _ => {
             let l = &world.lights[(r.next() * world.lights.len() as f64) as usize];
-            let away = l.radius * r.scale(0.03, 10.0);
-            [l.center + away * r.direction(), r.direction()]
+            let away = l.radius * scale(&mut r, 0.03, 10.0);
+            [l.center + away * direction(&mut r), direction(&mut r)]
         }
     };
     let rounded = |[p, n]: [DVec3; 2]| [p.as_vec3().as_dvec3(), n.as_vec3().as_dvec3()];
@@ -241,7 +224,8 @@ fn probe(
     inputs: &[Values],
 ) -> Vec<Values> {
     let body = format!(
-        "let at = Receiver(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), vec3f(x[9], x[10], x[11]), x[12], x[13], x[14]);
+        "let p = vec3f(x[0], x[1], x[2]);
+        let at = Receiver(vec3f(x[3], x[4], x[5]), vec3f(x[9], x[10], x[11]), x[12], x[13], x[14]);
         {body}"
     );
     let source = scene_probe_source(world, settings, Access::Tree, &body);
@@ -254,14 +238,14 @@ fn probe(
 /// How a receiver scatters: where it mirrors the eye, its diffuse and specular shares, an eighth of its exponent. Two in five are
 /// diffuse, the others glossy, from dull to almost a mirror, of which a third are nothing but that.
 fn gloss([p, n]: [DVec3; 2]) -> [f64; 6] {
-    let mut r = Numbers(p.x.to_bits() ^ p.z.to_bits().rotate_left(21));
+    let mut r = Uniform(p.x.to_bits() ^ p.z.to_bits().rotate_left(21));
     let (kind, share) = ([(); 4].map(|()| r.next())[3], r.next());
-    let d = r.direction();
+    let d = direction(&mut r);
     let [x, y, z] = (d - n * (2.0 * d.dot(n)).min(0.0)).to_array();
     if kind < 0.4 {
         return [x, y, z, 1.0, 0.0, 0.0];
     }
-    let exponent = r.scale(1.0, 1e4);
+    let exponent = scale(&mut r, 1.0, 1e4);
     let diffuse = if kind < 0.6 { 0.0 } else { 0.5 * share };
     [
         x,
@@ -298,7 +282,7 @@ fn no_light_is_lost() {
         &gpu,
         &world,
         &settings,
-        "y[0] = light_probability(u32(x[6]), at);",
+        "y[0] = light_probability(u32(x[6]), p, at);",
         &inputs,
     );
     let mut sending = 0;
@@ -332,17 +316,17 @@ fn lights_are_chosen_as_often_as_said() {
     let world = World::new(&hall, SIZE);
     let receivers = receivers(&world, 96);
     let lights = world.lights.len();
-    let mut r = Numbers(9);
+    let mut r = Uniform(9);
     let mut inputs = Vec::new();
     for &at in &receivers {
         inputs.extend((0..lights).map(|i| input(at, [i as f64, 0.5, 0.5])));
         inputs.extend((0..TIMES).map(|_| input(at, [0.0, r.next(), r.next()])));
     }
     let body = "
-        let chosen = choose_light(at, vec2f(x[7], x[8]));
+        let chosen = choose_light(p, at, vec2f(x[7], x[8]));
         y[0] = select(f32(chosen.index), -1.0, chosen.inverse_probability == 0.0);
-        y[1] = chosen.inverse_probability * light_probability(chosen.index, at);
-        y[2] = light_probability(u32(x[6]), at);";
+        y[1] = chosen.inverse_probability * light_probability(chosen.index, p, at);
+        y[2] = light_probability(u32(x[6]), p, at);";
     let out = probe(&gpu, &world, &settings, body, &inputs);
     // By light, and last of all nothing: how often it was chosen, and was to be, and the variance of that.
     let mut counts = vec![[0.0; 3]; lights + 1];

@@ -1,5 +1,6 @@
 //! Dispatches: samples are cut into submissions by measured cost, which touches no bit of the picture.
 
+use super::held::{Held, count_row, goes_on};
 use super::pack::{Params, pack};
 use super::seen::SeenLights;
 use super::tile::{self, Tile};
@@ -7,7 +8,7 @@ use super::work::{Work, coprime_stride, workgroups};
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::coverage::Rect;
-use crate::film::{BLOCK, Film, REPLICATES, Sums};
+use crate::film::{BLOCK, Film};
 use crate::kernel::{Access, Kernel, compose};
 use crate::settings::Settings;
 use crate::world::World;
@@ -42,41 +43,6 @@ pub struct GpuEngine {
     seconds_per_path: Option<f64>,
     compile_seconds: f64,
     read_back_seconds: f64,
-}
-
-/// Running sums that lie in a tile's textures.
-struct Held {
-    tile: Rect,
-    /// Which texture.
-    place: usize,
-    /// The sums, rows of the tile.
-    running: Vec<[Sums<f32>; REPLICATES]>,
-}
-
-impl Held {
-    /// Whether the parts that go on with a block go on from just these sums: they need not be put into the textures again
-    /// then.
-    fn serves(&self, film: &Film, tile: Rect, parts: &[Part]) -> bool {
-        let same = |rect: Rect, y: u32| {
-            let width = rect.width() as usize;
-            let here =
-                (y - tile.y0) as usize * tile.width() as usize + (rect.x0 - tile.x0) as usize;
-            let there = film.index(rect.x0, y);
-            let bytes: &[u8] = bytemuck::cast_slice(&self.running[here..here + width]);
-            bytes == bytemuck::cast_slice::<_, u8>(&film.partial()[there..there + width])
-        };
-        self.tile == tile
-            && !film.partial().is_empty()
-            && parts
-                .iter()
-                .filter(|p| goes_on(p))
-                .all(|p| (p.rect.y0..p.rect.y1).all(|y| same(p.rect, y)))
-    }
-}
-
-/// Whether a part goes on with a block that is begun.
-fn goes_on(part: &Part) -> bool {
-    !part.samples.start.is_multiple_of(BLOCK)
 }
 
 /// What is under way while an engine is made, in this order.
@@ -487,29 +453,6 @@ impl GpuEngine {
         });
         Ok(counters)
     }
-}
-
-/// What the counters of some pixels say, as `shaders/path.wgsl` packs them for a block that begins with sample number `block`:
-/// all of it together, and which pixels have lost samples of which replicates.
-fn count_row(
-    pixels: impl Iterator<Item = (u32, u32, [u32; 4])>,
-    block: u64,
-) -> (Counters, Vec<(u32, u32, [u64; REPLICATES])>) {
-    let mut counters = Counters::default();
-    let mut lost = Vec::new();
-    for (x, y, c) in pixels {
-        let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
-        counters.rays += u64::from(c[0]);
-        counters.truncated += half(1, 0);
-        let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
-        if left_out != [0; REPLICATES] {
-            lost.push((x, y, left_out));
-            counters.nonfinite += left_out.iter().sum::<u64>();
-            let first = (x, y, block + half(1, 16) - 1);
-            counters.first_nonfinite = counters.first_nonfinite.or(Some(first));
-        }
-    }
-    (counters, lost)
 }
 
 impl Engine for GpuEngine {

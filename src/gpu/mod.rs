@@ -2,6 +2,7 @@
 
 mod adapters;
 mod engine;
+mod held;
 pub mod pack;
 pub mod probe;
 #[cfg(test)]

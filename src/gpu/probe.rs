@@ -13,6 +13,26 @@ pub type Values = [f32; 16];
 /// What an output reads that no invocation wrote; no function returns it.
 pub const UNWRITTEN: f32 = -1.234_567_8e-30;
 
+/// Deterministic uniform numbers for inputs, by Knuth's linear congruence.
+pub struct Uniform(pub u64);
+
+impl Uniform {
+    /// The next, in [0, 1): a multiple of 2⁻²⁴, as f32 holds.
+    #[allow(clippy::should_implement_trait, reason = "it never ends")]
+    pub fn next(&mut self) -> f64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f64 / (1u64 << 24) as f64
+    }
+
+    /// The next, in [a, b).
+    pub fn between(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.next()
+    }
+}
+
 /// Runs `body` once for each of `inputs`: WGSL statements that read `x`, an array of 16 floats, and write
 /// `y`, another. The product's own modules are there, under `features`.
 ///

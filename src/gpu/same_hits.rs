@@ -1,7 +1,7 @@
 //! Walks through trees against loops over all surfaces: the same surface at the same distance, to the bit where a compiler
 //! takes products and sums as they stand.
 
-use super::probe::{Probe, Values};
+use super::probe::{Probe, Uniform, Values};
 use super::{Choice, Gpu};
 use crate::kernel::{Access, scene_probe_source};
 use crate::scene::parse::parse_str;
@@ -26,24 +26,8 @@ const BODY: &str = "
     y[2] = select(0.0, 1.0, occluded(shadow, x[8], 0u));
 ";
 
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / (1u64 << 24) as f64
-    }
-
-    fn between(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.next()
-    }
-
-    fn vector(&mut self, half: f64) -> [f64; 3] {
-        [(); 3].map(|()| self.between(-half, half))
-    }
+fn vector(r: &mut Uniform, half: f64) -> [f64; 3] {
+    [(); 3].map(|()| r.between(-half, half))
 }
 
 const STAGE: &str = "\
@@ -91,25 +75,25 @@ fn cylinder(s: &mut String, base: [f64; 3], top: [f64; 3], radius: f64, material
 }
 
 /// A bit of everything.
-fn mixed(r: &mut Numbers, of_each: usize) -> String {
+fn mixed(r: &mut Uniform, of_each: usize) -> String {
     let mut s = STAGE.to_owned();
     s += "[[plane]]\npoint = [0, -6, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n";
     for i in 0..of_each {
         let material = if i % 3 == 0 { "glass" } else { "white" };
         let size = r.between(0.02, 0.4);
-        sphere(&mut s, r.vector(5.0), size, material);
-        disk(&mut s, "disk", r.vector(5.0), r.vector(1.0), size);
-        let base = r.vector(5.0);
-        let along = r.vector(1.0);
+        sphere(&mut s, vector(r, 5.0), size, material);
+        disk(&mut s, "disk", vector(r, 5.0), vector(r, 1.0), size);
+        let base = vector(r, 5.0);
+        let along = vector(r, 1.0);
         let top = [0, 1, 2].map(|k| base[k] + along[k]);
         cylinder(&mut s, base, top, 0.3 * size, material);
-        disk(&mut s, "light", r.vector(5.0), r.vector(1.0), 0.5 * size);
+        disk(&mut s, "light", vector(r, 5.0), vector(r, 1.0), 0.5 * size);
     }
     s
 }
 
 /// Spheres about one point, many of them equal.
-fn concentric(r: &mut Numbers) -> String {
+fn concentric(r: &mut Uniform) -> String {
     let mut s = STAGE.to_owned();
     for i in 0..150 {
         let radius = if i % 2 == 0 { 2.0 } else { r.between(0.5, 3.0) };
@@ -124,11 +108,11 @@ fn concentric(r: &mut Numbers) -> String {
 }
 
 /// One giant, and dust all over it.
-fn dust(r: &mut Numbers) -> String {
+fn dust(r: &mut Uniform) -> String {
     let mut s = STAGE.to_owned();
     sphere(&mut s, [0.0, -1000.0, 0.0], 998.0, "white");
     for _ in 0..200 {
-        let [x, y, z] = r.vector(4.0);
+        let [x, y, z] = vector(r, 4.0);
         sphere(
             &mut s,
             [x, y.abs() * 0.01 - 2.0, z],
@@ -140,10 +124,10 @@ fn dust(r: &mut Numbers) -> String {
 }
 
 /// Disks and lights in a few planes, one over the other.
-fn coplanar(r: &mut Numbers) -> String {
+fn coplanar(r: &mut Uniform) -> String {
     let mut s = STAGE.to_owned();
     for i in 0..150 {
-        let [x, y, _] = r.vector(4.0);
+        let [x, y, _] = vector(r, 4.0);
         let z = f64::from(i % 3);
         let radius = r.between(0.1, 1.0);
         if i % 2 == 0 {
@@ -157,26 +141,26 @@ fn coplanar(r: &mut Numbers) -> String {
 }
 
 /// From a hundredth of a thousandth to a hundred thousand.
-fn scales(r: &mut Numbers) -> String {
+fn scales(r: &mut Uniform) -> String {
     let mut s = STAGE.to_owned();
     for _ in 0..200 {
         let scale = 10f64.powf(r.between(-2.0, 5.0));
         let size = 0.2 * scale * r.next() + 1e-5;
         let material = if r.next() < 0.2 { "glass" } else { "white" };
-        sphere(&mut s, r.vector(scale), size, material);
-        disk(&mut s, "disk", r.vector(scale), r.vector(1.0), size);
+        sphere(&mut s, vector(r, scale), size, material);
+        disk(&mut s, "disk", vector(r, scale), vector(r, 1.0), size);
     }
     s
 }
 
 /// Rays from all about, some along the axes, some from surfaces, aimed at nothing or at the light.
-fn rays(world: &World, r: &mut Numbers, half: f64) -> Vec<Values> {
+fn rays(world: &World, r: &mut Uniform, half: f64) -> Vec<Values> {
     (0..RAYS)
         .map(|i| {
             let mut x: Values = [0.0; 16];
-            let from = r.vector(half).map(|v| v as f32);
+            let from = vector(r, half).map(|v| v as f32);
             let d = loop {
-                let v = r.vector(1.0);
+                let v = vector(r, 1.0);
                 let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
                 if length > 0.1 && length < 1.0 {
                     break v.map(|c| (c / length) as f32);
@@ -194,7 +178,7 @@ fn rays(world: &World, r: &mut Numbers, half: f64) -> Vec<Values> {
             if i % 3 == 0 {
                 // Standing on a face.
                 let p = &world.primitives[(r.next() * world.primitives.len() as f64) as usize];
-                let out = DVec3::from_array(r.vector(1.0)).normalize();
+                let out = DVec3::from_array(vector(r, 1.0)).normalize();
                 let at = match p.geometry {
                     Geometry::Sphere { center, radius } => Some(center + radius * out),
                     Geometry::Disk { center, .. } => Some(center),
@@ -221,7 +205,7 @@ fn rays(world: &World, r: &mut Numbers, half: f64) -> Vec<Values> {
 #[test]
 fn a_walk_through_trees_meets_what_a_loop_meets() {
     let gpu = Gpu::open(&Choice::default()).expect("an adapter");
-    let mut r = Numbers(11);
+    let mut r = Uniform(11);
     let scenes = [
         ("few", mixed(&mut r, 3), 6.0),
         ("mixed", mixed(&mut r, 60), 6.0),

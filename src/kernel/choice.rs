@@ -23,21 +23,21 @@ struct Chosen {
 pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>) -> String {
     let mut s = String::from(CHOSEN);
     let weighs = features.contains("LIGHT_WEIGHTS");
-    let (receiver, p) = match weighs {
-        true => ("to: Receiver", "to.p"),
-        false => ("p: vec3f", "p"),
-    };
-    let _ = writeln!(s, "fn choose_light({receiver}, u: f32) -> Chosen {{");
+    let receiver = if weighs { "to: Receiver, " } else { "" };
+    let _ = writeln!(
+        s,
+        "fn choose_light(p: vec3f, {receiver}u: f32) -> Chosen {{"
+    );
     if let [only] = world.lights.as_slice() {
         let _ = writeln!(s, "    let light = {};", light_literal(only));
         // Images are chosen against the light's own weight.
         let weight = match weighs {
-            true => "light_weight(light, to)",
+            true => "light_weight(light, p, to)",
             false => "1.0",
         };
         let _ = writeln!(
             s,
-            "    return Chosen(light, 0u, cap_of(light, {p}), 1.0, {weight});\n}}"
+            "    return Chosen(light, 0u, cap_of(light, p), 1.0, {weight});\n}}"
         );
         return s;
     }
@@ -47,7 +47,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
             // All weights stay in registers; the first partial sum above u times the whole chooses.
             for (i, l) in world.lights.iter().enumerate() {
                 let _ = writeln!(s, "    let light_{i} = {};", light_literal(l));
-                let _ = writeln!(s, "    let w_{i} = light_weight(light_{i}, to);");
+                let _ = writeln!(s, "    let w_{i} = light_weight(light_{i}, p, to);");
                 let before = if i == 0 {
                     String::new()
                 } else {
@@ -80,7 +80,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
     var v = u;
     for (var i = 0u; i < {}u; i++) {{
         let light = lights[i];
-        let w = light_weight(light, to);
+        let w = light_weight(light, p, to);
         sum += w;
         let share = w / select(sum, 1.0, sum <= 0.0);
         let take = v < share;
@@ -94,7 +94,7 @@ pub(super) fn generate(world: &World, access: Access, features: &BTreeSet<&str>)
         }
     }
     s.push_str("    let light = light_at(index);\n");
-    s.push_str("    return Chosen(light, index, cap_of(light, to.p), select(sum / fmax(chosen, TINY), 0.0, chosen <= 0.0), sum);\n}\n");
+    s.push_str("    return Chosen(light, index, cap_of(light, p), select(sum / fmax(chosen, TINY), 0.0, chosen <= 0.0), sum);\n}\n");
     s
 }
 

@@ -1,7 +1,7 @@
 //! Where a mirror ball shows a light.
 
 use super::{Numbers, probe, vector};
-use etendue::gpu::probe::Values;
+use etendue::gpu::probe::{Uniform, Values};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 /// against a ray in f64 that is reflected, and its neighbours.
 #[test]
 fn images_in_mirror_balls() {
-    let mut r = Numbers(11);
+    let mut r = Numbers(Uniform(11));
     let inputs: Vec<Values> = (0..200_000)
         .map(|_| {
             let mut x = [0.0; 16];

@@ -4,7 +4,7 @@
 mod common;
 mod images;
 
-use etendue::gpu::probe::{UNWRITTEN, Values, run};
+use etendue::gpu::probe::{UNWRITTEN, Uniform, Values, run};
 use etendue::gpu::{Choice, Gpu};
 use etendue::reference::{dielectric, light};
 use etendue::world::WorldLight;
@@ -28,15 +28,11 @@ fn probe(features: &[&'static str], body: &str, inputs: &[Values]) -> Vec<Values
 }
 
 /// Deterministic uniform numbers for inputs.
-struct Numbers(u64);
+struct Numbers(Uniform);
 
 impl Numbers {
     fn next(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+        self.0.next() as f32
     }
 
     fn between(&mut self, a: f32, b: f32) -> f32 {
@@ -65,7 +61,7 @@ const RAY: &str =
     "let ray = Ray(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), NO_FACE, 0u, NO_FACE);\n";
 
 fn ray_inputs(n: usize, seed: u64) -> Vec<Values> {
-    let mut r = Numbers(seed);
+    let mut r = Numbers(Uniform(seed));
     (0..n)
         .map(|_| {
             let mut x = [0.0; 16];
@@ -203,7 +199,7 @@ fn cylinders_are_met_where_f64_meets_them() {
 
 #[test]
 fn fresnel_is_that_of_f64() {
-    let mut r = Numbers(3);
+    let mut r = Numbers(Uniform(3));
     let inputs: Vec<Values> = (0..50_000)
         .map(|i| {
             let mut x = [0.0; 16];
@@ -232,7 +228,7 @@ fn fresnel_is_that_of_f64() {
 
 #[test]
 fn phong_power_keeps_its_digits() {
-    let mut r = Numbers(4);
+    let mut r = Numbers(Uniform(4));
     for exponent in [0.0f32, 1.0, 10.0, 1e3, 1e5] {
         let inputs: Vec<Values> = (0..20_000)
             .map(|_| {
@@ -292,7 +288,7 @@ fn light_text() -> String {
 
 #[test]
 fn cap_samples_lie_on_the_disk_with_the_density_they_state() {
-    let mut r = Numbers(5);
+    let mut r = Numbers(Uniform(5));
     let l = test_light();
     let inputs: Vec<Values> = (0..100_000)
         .map(|_| {
@@ -399,7 +395,7 @@ fn random_numbers_are_even_in_pairs() {
 
 #[test]
 fn directions_follow_their_densities() {
-    let mut r = Numbers(6);
+    let mut r = Numbers(Uniform(6));
     let n = 1 << 19;
     let inputs: Vec<Values> = (0..n)
         .map(|_| {
