@@ -55,17 +55,28 @@ struct LightSample {
     inverse_pdf: f32,
 }
 
-fn sample_cap(light: DiskLight, cap: Cap, u: vec2f) -> LightSample {
-    let depth = (1.0 - u.x) * cap.height;
-    let rho = safe_sqrt(u.x * (light.radius * light.radius + (1.0 - u.x) * cap.height * cap.height));
-    let circle = unit_circle(u.y) * rho;
-    let d = from_frame(light.normal, vec3f(circle, -depth)) - cap.v;
+// The direction to a point of the cap, given by a unit vector away from the light's axis and a number in [0, 1); not yet the
+// distance to the disk, but that to the cap.
+fn cap_point(light: DiskLight, cap: Cap, outwards: vec3f, u: f32) -> LightSample {
+    let depth = (1.0 - u) * cap.height;
+    let rho = safe_sqrt(u * (light.radius * light.radius + (1.0 - u) * cap.height * cap.height));
+    let d = outwards * rho - light.normal * depth - cap.v;
     let length2 = dot(d, d);
     let inverse_length = inverseSqrt(fmax(length2, TINY_SQUARE));
-    let to_disk = cap.h / fmax(cap.h + depth, TINY);
-    let sample = cap.height > 0.0 && length2 > 0.0;
     let inverse_pdf = 3.14159265 * cap.height * inverse_length;
-    return LightSample(d * inverse_length, length2 * inverse_length * to_disk, select(0.0, inverse_pdf, sample));
+    let sample = cap.height > 0.0 && length2 > 0.0;
+    return LightSample(d * inverse_length, length2 * inverse_length, select(0.0, inverse_pdf, sample));
+}
+
+// Onwards from there to the disk.
+fn from_cap(cap: Cap, sample: LightSample, u: f32) -> LightSample {
+    let to_disk = cap.h / fmax(cap.h + (1.0 - u) * cap.height, TINY);
+    return LightSample(sample.d, sample.distance * to_disk, sample.inverse_pdf);
+}
+
+fn sample_cap(light: DiskLight, cap: Cap, u: vec2f) -> LightSample {
+    let outwards = from_frame(light.normal, vec3f(unit_circle(u.y), 0.0));
+    return from_cap(cap, cap_point(light, cap, outwards, u.x), u.x);
 }
 
 // The density with which sample_cap takes direction d, which meets the disk; per solid angle.
@@ -82,7 +93,7 @@ const LIGHT_COLORS: vec3f = vec3f(0.273, 0.5243, 0.2027);
 // What light is sent to at some point: its normal there, and how it scatters.
 struct Receiver {
     n: vec3f,
-#if GLOSSY_LIGHTS
+#if GLOSSY
     // Where it mirrors the eye.
     r: vec3f,
     // How much of all light it scatters, and at most of light from r, in one unit; and an eighth of the lobe's exponent.
@@ -92,7 +103,7 @@ struct Receiver {
 #endif
 }
 
-#if GLOSSY_LIGHTS
+#if GLOSSY
 // About how much it scatters of the light of things in a ball of this radius; `to` leads to its centre, 1 / `inverse` far. At an
 // angle alpha off the lobe's axis cos^n(alpha) is about exp(-n sin^2(alpha) / 2), for which (1 + n sin^2(alpha) / 8)^-4
 // stands; over the ball it is as much flatter as it is wider.
@@ -122,10 +133,39 @@ fn light_weight(light: DiskLight, p: vec3f, at: Receiver) -> f32 {
     // Factors without unit: a compiler may take them in any order, and products of many lengths leave f32.
     let per_length = light.radius * inverse;
     let sent = select(0.0, brightness * (facing * per_length) * (above * per_length), h > 0.0);
-#if GLOSSY_LIGHTS
+#if GLOSSY
     return sent * scattered(at, to, inverseSqrt(fmax(dot(to, to), TINY_SQUARE)), light.radius);
 #else
     return sent;
 #endif
 }
+
+#if GLOSSY
+struct SuitedSample {
+    to: LightSample,
+    // What it is worth beside a sample of sample_cap.
+    worth: f32,
+}
+
+// One of two opposite points of the cap, by how much light the receiver about scatters from there [Talbot2005]. A lobe often
+// sees just a part of a light. With a second point drawn afresh the variance was the same, with three or four hardly less.
+fn sample_suited(light: DiskLight, cap: Cap, at: Receiver, u: vec2f, choice: f32) -> SuitedSample {
+    let outwards = from_frame(light.normal, vec3f(unit_circle(u.y), 0.0));
+    let opposite = fract(u.x + 0.5);
+    let one = cap_point(light, cap, outwards, u.x);
+    let two = cap_point(light, cap, -outwards, opposite);
+    let suits_one = fmax(dot(at.n, one.d), 0.0) * one.inverse_pdf * scattered(at, one.d, 1.0, 0.0);
+    let suits_two = fmax(dot(at.n, two.d), 0.0) * two.inverse_pdf * scattered(at, two.d, 1.0, 0.0);
+    let sum = suits_one + suits_two;
+    let second = choice * sum >= suits_one;
+    let taken = LightSample(
+        select(one.d, two.d, second),
+        select(one.distance, two.distance, second),
+        select(one.inverse_pdf, two.inverse_pdf, second)
+    );
+    let suits = select(suits_one, suits_two, second);
+    let worth = select(0.0, 0.5 * (sum / select(1.0, suits, suits > 0.0)), suits > 0.0);
+    return SuitedSample(from_cap(cap, taken, select(u.x, opposite, second)), worth);
+}
+#endif
 #endif

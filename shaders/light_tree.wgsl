@@ -41,7 +41,7 @@ fn cluster_importance(c: LightCluster, p: vec3f, at: Receiver) -> f32 {
     let dark = power == 0.0 || (far && (cosines.x < -0.002 || cosines.y < -0.002));
     let both = clamp(cosines, vec2f(0.01), vec2f(1.0));
     var weight = power * select(1.0, both.x * both.y, far) * inverse * inverse;
-#if GLOSSY_LIGHTS
+#if GLOSSY
     weight *= scattered(at, -v, inverse, c.radius);
 #endif
     return select(max(weight, TINY), 0.0, dark);

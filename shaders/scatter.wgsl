@@ -106,7 +106,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     }
 
 #if LIGHT_WEIGHTS
-#if GLOSSY_LIGHTS
+#if GLOSSY
     var receiver = Receiver(n, mirrored(d, n), 1.0, 0.0, 0.0);
     if material.kind == MATERIAL_PHONG {
         let shares = vec2f(dot(material.color, LIGHT_COLORS), dot(material.specular, LIGHT_COLORS));
@@ -127,6 +127,9 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         for (var k = 0u; k < u32(SHADOW_RAYS); k++) {
             var points = u.points.xy;
             var choice = u.choices.x;
+#if GLOSSY
+            var among = u.choices.y;
+#endif
 #if LIGHT_TREE
             var spare = u.choices.w;
 #endif
@@ -134,6 +137,9 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
                 let more = draw(draw_key + vec4u(0u, 0u, k << 20u, 0u));
                 points = more.points.xy;
                 choice = more.choices.x;
+#if GLOSSY
+                among = more.choices.y;
+#endif
 #if LIGHT_TREE
                 spare = more.choices.w;
 #endif
@@ -142,6 +148,9 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #else
             let points = u.points.xy;
             let choice = u.choices.x;
+#if GLOSSY
+            let among = u.choices.y;
+#endif
 #if LIGHT_TREE
             let spare = u.choices.w;
 #endif
@@ -156,7 +165,13 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
 #endif
 #endif
             weights = chosen.weights;
+#if GLOSSY
+            // The lobe's number is free here: what it decides below adds to this, and does not multiply it.
+            let suited = sample_suited(chosen.light, chosen.cap, receiver, points, among);
+            let to = suited.to;
+#else
             let to = sample_cap(chosen.light, chosen.cap, points);
+#endif
             let cos = dot(n, to.d);
             // 1 / density of this sample among all.
             let inverse_pdf = to.inverse_pdf * chosen.inverse_probability * (1.0 / SHADOW_RAYS);
@@ -180,7 +195,11 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
                 (*count).x += 1u;
                 let shadow = Ray(v.p, to.d, face, (*path).ray.medium, chosen.light.face);
                 if !occluded(shadow, to.distance, chosen.index) {
+#if GLOSSY
+                    gathered += f_cos * chosen.light.radiance * (inverse_pdf * suited.worth);
+#else
                     gathered += f_cos * chosen.light.radiance * inverse_pdf;
+#endif
                 }
             }
 #if SEVERAL_SHADOW_RAYS

@@ -8,7 +8,7 @@ use crate::settings::{Integrator, LightParts, Settings};
 use serde::{Deserialize, Serialize, Serializer};
 
 /// Changes whenever a sample of the same number and seed gets another value.
-pub const SAMPLER_VERSION: u32 = 6;
+pub const SAMPLER_VERSION: u32 = 7;
 
 /// What a film was made from, by and on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -361,10 +361,10 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
     );
     let several = sampling && world.lights.len() > 1;
     set("SEVERAL_LIGHTS", several);
-    set("GLOSSY_LIGHTS", several && phong);
+    set("GLOSSY", sampling && phong);
     let images = !images::of(world, settings, access).is_empty();
     set("IMAGES", images);
-    set("LIGHT_WEIGHTS", images || several);
+    set("LIGHT_WEIGHTS", images || several || (sampling && phong));
     set(
         "EXTREME_LIGHTS",
         world

@@ -349,6 +349,79 @@ fn cap_samples_lie_on_the_disk_with_the_density_they_state() {
     assert!(compared > 50_000);
 }
 
+/// Over a grid of random numbers, sums of light that the cap's own samples and the suited ones make: whole, seen by a lobe, and in
+/// a direction.
+#[test]
+fn suited_samples_make_the_integrals_of_all_samples() {
+    const CELLS: usize = 24;
+    let mut r = Numbers(Uniform(21));
+    let l = test_light();
+    let n = l.normal;
+    let places: Vec<Values> = (0..60)
+        .map(|i| {
+            let mut x = [0.0; 16];
+            let aside = r.direction();
+            let p = l.center + n * f64::from(r.between(0.1, 2.0)) + aside * 0.08;
+            // A receiver that faces the light, more or less, and mirrors the eye anywhere.
+            let normal = (r.direction() * 0.9 - n).normalize();
+            let mirrored = (r.direction() * f64::from(r.between(0.0, 1.0)) - n).normalize();
+            for k in 0..3 {
+                (x[k], x[3 + k], x[6 + k]) = (p[k] as f32, normal[k] as f32, mirrored[k] as f32);
+            }
+            let exponent = 10f32.powf(r.between(0.0, 2.0));
+            x[9] = [0.2, 0.5, 1.0][i % 3];
+            (x[10], x[11]) = ((1.0 - x[9]) * (0.5 * exponent + 1.0), 0.125 * exponent);
+            x
+        })
+        .collect();
+    let mut inputs: Vec<Values> = Vec::new();
+    for place in &places {
+        for cell in 0..CELLS * CELLS {
+            let mut x = *place;
+            [x[12], x[13]] = [cell / CELLS, cell % CELLS].map(|i| (i as f32 + 0.5) / CELLS as f32);
+            x[14] = r.next();
+            inputs.push(x);
+        }
+    }
+    let body = format!(
+        "{} let p = vec3f(x[0], x[1], x[2]); let cap = cap_of(light, p); let u = vec2f(x[12], x[13]);
+         let at = Receiver(vec3f(x[3], x[4], x[5]), vec3f(x[6], x[7], x[8]), x[9], x[10], x[11]);
+         let plain = sample_cap(light, cap, u);
+         let f = vec3f(1.0, scattered(at, plain.d, 1.0, 0.0), plain.distance) * fmax(dot(at.n, plain.d), 0.0) * plain.inverse_pdf;
+         var g = vec3f(0.0);
+         var second = 0.0;
+         for (var i = 0u; i < 64u; i++) {{
+             let s = sample_suited(light, cap, at, u, (f32(i) + x[14]) / 64.0);
+             g += vec3f(1.0, scattered(at, s.to.d, 1.0, 0.0), s.to.distance) * fmax(dot(at.n, s.to.d), 0.0) * (s.to.inverse_pdf * s.worth / 64.0);
+             second += select(0.0, 1.0, dot(s.to.d, plain.d) < 0.999999);
+         }}
+         y[0] = f.x; y[1] = f.y; y[2] = f.z; y[3] = g.x; y[4] = g.y; y[5] = g.z; y[6] = second;",
+        light_text()
+    );
+    let out = probe(
+        &["LIGHT_SAMPLING", "LIGHT_WEIGHTS", "GLOSSY"],
+        &body,
+        &inputs,
+    );
+    let mut others = 0.0;
+    for (place, cells) in places.iter().zip(out.chunks(CELLS * CELLS)) {
+        let sum = |k: usize| -> f64 { cells.iter().map(|y| f64::from(y[k])).sum() };
+        others += sum(6);
+        for k in 0..3 {
+            let (plain, suited) = (sum(k), sum(3 + k));
+            assert!(
+                (suited / plain - 1.0).abs() < 0.01,
+                "integral {k} at {place:?}: {suited} instead of {plain}"
+            );
+        }
+    }
+    let share = others / (inputs.len() * 64) as f64;
+    assert!(
+        (0.3..0.7).contains(&share),
+        "the second point in {share} of all"
+    );
+}
+
 /// Pearson's χ² of counts that should be even, as a z-score (the normal limit for many bins).
 fn chi_square_z(counts: &[u32]) -> f64 {
     let n: f64 = counts.iter().map(|c| f64::from(*c)).sum();
