@@ -16,6 +16,14 @@ fn power_heuristic(inverse: f32, b: f32) -> f32 {
     let r = b * inverse;
     return 1.0 / (1.0 + r * r);
 }
+
+#if GLOSSY
+// How dense light sampling counts as: with sample_suited up to twice as dense as without, where it matters. Squared errors had
+// efficiencies of 1.13 (1000 spheres), 1.08 (phong_gallery) and 1.05 so; 1.5 and 3 were no better.
+const DENSER: f32 = 2.0;
+#else
+const DENSER: f32 = 1.0;
+#endif
 #endif
 
 // What a light met by chance adds, before the path's weight.
@@ -35,7 +43,7 @@ fn emission(path: Path, hit: Hit) -> vec3f {
         pdf *= light_weight(light, path.ray.o, path.receiver) / fmax(path.weights, TINY);
 #endif
 #endif
-        share *= power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * pdf);
+        share *= power_heuristic(1.0 / fmax(path.pdf, TINY), SHADOW_RAYS * DENSER * pdf);
     } else {
         share *= select(0.0, 1.0, path.specular);
     }
@@ -179,7 +187,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
                 var f_cos = material.color * (0.31830989 * cos);
 #if MIS_DIFFUSE
                 if material.kind == MATERIAL_DIFFUSE {
-                    f_cos *= power_heuristic(inverse_pdf, cos * 0.31830989);
+                    f_cos *= power_heuristic(inverse_pdf * (1.0 / DENSER), cos * 0.31830989);
                 }
 #endif
 #if PHONG
@@ -188,7 +196,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
                     let value = phong_value(material.color, material.specular, material.exponent, cos, power);
                     f_cos = value.f_cos;
 #if MIS
-                    f_cos *= power_heuristic(inverse_pdf, value.pdf);
+                    f_cos *= power_heuristic(inverse_pdf * (1.0 / DENSER), value.pdf);
 #endif
                 }
 #endif
