@@ -311,7 +311,7 @@ mod tests {
         let last = &lines[21];
         assert_eq!(last["type"], "crossover");
         assert!((last["even_at"].as_f64().expect("a number") - 50.0).abs() < 1e-9);
-        assert_eq!(last["baked_up_to"], 45);
+        assert_eq!(last["baked_up_to"], 53);
         assert!(last["lights_looked_at_up_to"].is_null());
     }
 }

@@ -4,9 +4,10 @@ use crate::engine::DeviceInfo;
 use crate::world::World;
 
 /// Scenes with more surfaces, lights included, have trees. By paths a second the two are even at about a hundred spheres (on
-/// lavapipe 22.3, of 512-bit vectors: 12 million at 8 spheres against 3.6, 6.0 at 48 against 3.7, 3.5 at 96 against 3.5), but
-/// unrolled code costs its compiler 0.7 s at 48 and twice that at 96, which a picture of few samples does not earn back.
-pub const BAKED_LIMIT: usize = 48;
+/// lavapipe 22.3, of 512-bit vectors: 12 million at 8 spheres against 3.6, 6.0 at 48 against 3.7, 3.5 at 96 against 3.5), and 16
+/// lights over 40 things of every shape and material run 1.3 times as fast when baked; but unrolled code costs its compiler 0.7
+/// s at 48 spheres, 1.0 s instead of 0.7 s there, and twice that at 96, which a picture of few samples does not earn back.
+pub const BAKED_LIMIT: usize = 56;
 
 /// Where the surfaces and lights are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -112,7 +112,7 @@ mod tests {
             "gpu-baked",
             "gpu-tree",
             "nanoseconds a path",
-            "the rule bakes up to 45",
+            "the rule bakes up to 53",
             "spheres, 512x384",
         ] {
             assert!(text.contains(word), "no {word}");

@@ -120,7 +120,7 @@ mod tests {
             "gpu-baked      256        0.20        0.10     10.0       2560            0.391       6.00",
             "gpu-baked ends at 256 spheres: compiling took 4.2 s",
             "gpu-baked and gpu-tree cost the same at 50 spheres",
-            "the rule takes gpu-baked up to 45 spheres, for compiling costs time too",
+            "the rule takes gpu-baked up to 53 spheres, for compiling costs time too",
         ] {
             assert!(text.lines().any(|l| l == line), "no {line:?} in {text}");
         }
