@@ -36,7 +36,7 @@ struct Left {
     unfinished: atomic<u32>,
     stuck: atomic<u32>,
     // For each pixel of the tile: the sample to begin with. Then for each: one past its last. Then for each, in kernels
-    // with trees: 1 if it may see a light.
+    // that look for lights: up to which vertex glances look there; 0 where there are none.
     next: array<u32>,
 }
 @group(1) @binding(4) var<storage, read_write> left: Left;
@@ -56,8 +56,14 @@ struct Path {
     // Every scattering so far was specular.
     clear: bool,
 #if SEEN_LIGHTS
-    // Camera rays still to be sent for what the sample sees of a light directly, before the path itself.
+    // Glances still to be sent before the path itself, this one included: camera rays that gather nothing but what they see
+    // of a light, directly or by way of mirrors and glass. The edge of a light, and of its image, is by far the noisiest
+    // thing in most pictures, and a camera ray costs a tenth of a path.
     glances: u32,
+#endif
+#if GLANCES_GO_ON
+    // Is one of as many glances that are reflected by glass now as go into it.
+    splits: bool,
 #endif
 #if MIS
     // Density of the last scattering, per solid angle; 0: light met by chance is all counted by light sampling.
@@ -95,44 +101,6 @@ fn begin(glances: u32) -> Path {
 #endif
     return path;
 }
-
-#if SEEN_LIGHTS
-// How many camera rays a sample of this pixel sends for what it sees of a light directly. The edge of a light is by far
-// the noisiest thing in most pictures, and a camera ray costs a tenth of a path. Any answer is right; this one holds
-// where the light's disk comes near the pixel, to first order.
-#if TREE
-// Where lights are many the host has looked for them.
-fn glances_at(index: u32) -> u32 {
-    let seen = left.next[2u * params.pixels + index];
-    return select(0u, GLANCES * GLANCES, seen == 1u);
-}
-#else
-fn glances_at(pixel: vec2u) -> u32 {
-    let at = vec2f(pixel) + 0.5 - CAMERA_CENTER;
-    let w = CAMERA_FORWARD + at.x * CAMERA_DX + at.y * CAMERA_DY;
-    let far = length(w);
-    let half_diagonal = 0.75 * length(CAMERA_DX);
-    var glances = 0u;
-    for (var i = 0u; i < LIGHT_KEYS / 4u; i++) {
-        let light = lights[i];
-        let to = light.center - CAMERA_EYE;
-        let height = light.offset - dot(light.normal, CAMERA_EYE);
-        let fall = dot(light.normal, w);
-        // Outside a ball around the light, first, which is all there is to say where its plane is seen from the edge.
-        let along = dot(to, w) / far;
-        let off = length(to - w * (along / far));
-        let near = along > 0.0 && off <= light.radius + half_diagonal * length(to);
-        let t = height / fmin(fall, -TINY);
-        let spread = 1.5 * t * half_diagonal * (1.0 - far / fmin(fall, -TINY));
-        let inside = length(w * t - to) <= light.radius + spread;
-        if height < 0.0 && near && (inside || fall > -3.0 * half_diagonal) {
-            glances = GLANCES * GLANCES;
-        }
-    }
-    return glances;
-}
-#endif
-#endif
 
 @compute @workgroup_size(64)
 fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -174,11 +142,15 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var going = true;
 #endif
 #if SEEN_LIGHTS
-#if TREE
-    let glances = glances_at(index);
+    let mark = left.next[2u * params.pixels + index];
+#if GLANCES_GO_ON
+    // And at which vertex one half of them goes into glass and the other is reflected; 0: that is left to chance everywhere.
+    let branch = mark >> BRANCH_SHIFT;
+    let sight = mark & ((1u << BRANCH_SHIFT) - 1u);
 #else
-    let glances = glances_at(pixel);
+    let sight = mark;
 #endif
+    let glances = select(0u, GLANCES * GLANCES, sight > 0u);
 #else
     let glances = 0u;
 #endif
@@ -202,11 +174,20 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 #if SEEN_LIGHTS
         let glance = path.glances > 0u;
         // What the glances have seen the path itself does not see again.
-        let blind = path.depth == 1u && glances > 0u && !glance;
+#if GLANCES_GO_ON
+        let blind = path.clear && path.depth <= sight && !glance;
+#else
+        let blind = path.depth <= sight && !glance;
+#endif
         if hit.key < LIGHT_KEYS && !blind {
             path.radiance += path.beta * emission(path, hit) * select(1.0, 1.0 / f32(GLANCES * GLANCES), glance);
         }
+#if GLANCES_GO_ON
+        let goes_on = !glance || path.depth < sight;
+        if goes_on && hit.key >= LIGHT_KEYS && hit.key != NONE {
+#else
         if !glance && hit.key >= LIGHT_KEYS && hit.key != NONE {
+#endif
 #else
         let glance = false;
         if hit.key < LIGHT_KEYS {
@@ -214,7 +195,14 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             path.radiance += path.beta * emission(path, hit);
         } else if hit.key != NONE {
 #endif
-            alive = scatter_at(&path, hit, vec4u(key, s, path.depth, params.seed), &count);
+#if GLANCES_GO_ON
+            // Random numbers of its own for each glance.
+            let seed = params.seed ^ (path.glances * 0x9e3779b9u);
+            path.splits = glance && path.depth == branch;
+#else
+            let seed = params.seed;
+#endif
+            alive = scatter_at(&path, hit, vec4u(key, s, path.depth, seed), &count);
         }
 
 #if TREE
@@ -233,10 +221,19 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 #endif
         var glances_left = 0u;
 #if SEEN_LIGHTS
+#if GLANCES_GO_ON
+        if glance && !alive {
+            let seen = path.radiance;
+            path = begin(path.glances - 1u);
+            path.radiance = seen;
+            glances_left = path.glances;
+        }
+#else
         if glance {
             path.glances -= 1u;
             glances_left = path.glances;
         }
+#endif
 #endif
         if !alive && !glance {
             // Add the sample, and start the next at once: no lane waits for a longer path.

@@ -87,6 +87,12 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         return false;
     }
 #endif
+#if GLANCES_GO_ON
+    let glance = (*path).glances > 0u;
+    if glance && material.kind != MATERIAL_MIRROR && material.kind != MATERIAL_DIELECTRIC {
+        return false;
+    }
+#endif
 #if IMAGES
     if (*path).memory >= SENT && material.kind != MATERIAL_MIRROR {
         return false;
@@ -303,7 +309,16 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
     if material.kind == MATERIAL_DIELECTRIC {
         let eta = select(1.0 / material.exponent, material.exponent, outside);
         let fresnel = refraction(cos_i, eta);
-        if u.choices.y < fresnel.transmitted {
+        var crosses = u.choices.y < fresnel.transmitted;
+#if GLANCES_GO_ON
+        // What glass reflects is a twentieth of what comes: left to chance it would be noise. Half of the glances see it, and
+        // weigh less: the black or the white fields of a chess board, by the toss of a coin for each sample.
+        let splits = (*path).splits;
+        let coin = hash_pixel(draw_key.x, draw_key.y, params.seed ^ 0x7f4a7c15u).x;
+        crosses = select(crosses, ((*path).glances ^ (((*path).glances - 1u) / GLANCES) ^ coin) % 2u == 0u, splits);
+        let share = 2.0 * select(1.0 - fresnel.transmitted, fresnel.transmitted, crosses);
+#endif
+        if crosses {
             next = refracted(d, n, cos_i, fresnel.cos_t, eta);
             weight = material.color;
             medium = select(surface.parent, surface.solid, outside);
@@ -311,6 +326,9 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
             next = mirrored(d, n);
             weight = vec3f(1.0);
         }
+#if GLANCES_GO_ON
+        weight *= select(1.0, share, splits);
+#endif
         (*path).specular = true;
     }
 #endif
@@ -335,6 +353,10 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         (*path).shown = brightest;
     }
     var survival = fmin(1.0, brightest / fmax(LITTLE * (*path).shown, TINY));
+#if GLANCES_GO_ON
+    // Few and short: what they show is to be free of noise.
+    survival = select(survival, 1.0, glance);
+#endif
 #if IMAGES
     if (*path).memory >= SENT {
         survival = 1.0;

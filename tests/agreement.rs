@@ -7,9 +7,13 @@
 mod common;
 
 use common::{block_means, cpu, film, gpu, read, scene, scene_files, settings, worst_t};
-use etendue::kernel::Access;
+use etendue::engine::Engine;
+use etendue::gpu::{Choice, Gpu, GpuEngine};
+use etendue::kernel::{Access, compose};
 use etendue::reference::Estimator;
 use etendue::scene::Scene;
+use etendue::settings::{LightParts, Settings};
+use etendue::world::World;
 use libtest_mimic::{Arguments, Failed, Trial};
 
 const FALSE_ALARM: f64 = 1e-4;
@@ -104,6 +108,54 @@ fn access_agrees(s: &Scene) -> Result<(), Failed> {
     )
 }
 
+/// Of the parts of the light each alone: extra camera rays keep what the path would have kept.
+fn part_agrees(s: &Scene, light: LightParts) -> Result<(), Failed> {
+    let runs = |spp: u64, first_seed: u32, engine: fn(&Scene, &Settings) -> Box<dyn Engine>| {
+        let runs = (0..RUNS).map(|k| {
+            let mut settings = settings(s, SIZE, first_seed + k);
+            settings.light = light;
+            block_means(&film(engine(s, &settings).as_mut(), &settings, spp), 6)
+        });
+        runs.collect::<Vec<_>>()
+    };
+    let reference = runs(64, 1000, |s, settings| {
+        Box::new(cpu(s, settings, Estimator::LightSampling))
+    });
+    let found = runs(256, 0, |s, settings| Box::new(gpu(s, settings, None)));
+    compare("GPU against reference", &found, &reference)
+}
+
+/// Kernels that look at lamps wrongly are found out: what the comparisons of this file are worth there.
+fn faults_are_seen(s: &Scene) -> Result<(), Failed> {
+    let reference = cpu_runs(s, 64, Estimator::LightSampling);
+    for (right, wrong) in [
+        // The path sees again what extra camera rays have seen in a mirror.
+        (
+            "let blind = path.clear && path.depth <= sight",
+            "let blind = path.depth <= min(sight, 1u)",
+        ),
+        // What glass reflects and what it lets through, as if each were half of the light.
+        ("weight *= select(1.0, share, splits);", ""),
+    ] {
+        let runs = (0..RUNS).map(|k| {
+            let settings = settings(s, SIZE, k);
+            let world = World::new(s, settings.size);
+            let mut kernel = compose(&world, &settings, None);
+            assert!(kernel.wgsl.contains(right), "{right}");
+            kernel.wgsl = kernel.wgsl.replace(right, wrong);
+            let gpu = Gpu::open(&Choice::default()).expect("an adapter");
+            // SAFETY: it is what `compose` made but for numbers that are no indices and end no loop.
+            let engine = unsafe { GpuEngine::with_kernel(gpu, &world, &settings, kernel) };
+            let mut engine = engine.expect("an engine");
+            block_means(&film(&mut engine, &settings, 256), 6)
+        });
+        if compare("", &runs.collect::<Vec<_>>(), &reference).is_ok() {
+            return Err(format!("\"{wrong}\" in the place of \"{right}\" is not seen").into());
+        }
+    }
+    Ok(())
+}
+
 fn main() {
     let args = Arguments::from_args();
     let adapters = etendue::gpu::adapters();
@@ -130,6 +182,39 @@ fn main() {
             agree(&scene(text))
         }));
     }
+    let none = LightParts {
+        emitted: false,
+        direct: false,
+        indirect: false,
+    };
+    let emitted = LightParts {
+        emitted: true,
+        ..none
+    };
+    let direct = LightParts {
+        direct: true,
+        ..none
+    };
+    let indirect = LightParts {
+        indirect: true,
+        ..none
+    };
+    trials.push(Trial::test("lamps_in_mirrors::faults_are_seen", || {
+        faults_are_seen(&scene(include_str!("scenes/lamps_in_mirrors.toml")))
+    }));
+    for (name, light) in [
+        ("emitted", emitted),
+        ("direct", direct),
+        ("indirect", indirect),
+    ] {
+        trials.push(Trial::test(
+            format!("lamps_in_mirrors::{name}_agrees"),
+            move || {
+                let text = include_str!("scenes/lamps_in_mirrors.toml");
+                part_agrees(&scene(text), light)
+            },
+        ));
+    }
     trials.push(Trial::test("many_spheres::agrees", || {
         agree(&many(300, 3, 0.8))
     }));
@@ -141,8 +226,12 @@ fn main() {
 
 /// Scenes with what the figures lack: nested and planar glass, an eye in glass, lights in glass and half in it, lights flush and near,
 /// stacked and on ends of cylinders, coplanar things, a room of huge spheres, a scene far from the origin.
-const HARD: [(&str, &str); 12] = [
+const HARD: [(&str, &str); 13] = [
     ("mirror_balls", include_str!("scenes/mirror_balls.toml")),
+    (
+        "lamps_in_mirrors",
+        include_str!("scenes/lamps_in_mirrors.toml"),
+    ),
     ("nested_glass", include_str!("scenes/nested_glass.toml")),
     ("water", include_str!("scenes/water.toml")),
     ("eye_in_glass", include_str!("scenes/eye_in_glass.toml")),

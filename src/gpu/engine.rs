@@ -34,8 +34,10 @@ pub struct GpuEngine {
     film_layout: wgpu::BindGroupLayout,
     params: wgpu::Buffer,
     tile: Option<Tile>,
-    /// Where lights are seen, if the kernel asks the host.
+    /// Where lights are seen, if the kernel asks.
     seen: Option<SeenLights>,
+    /// The tile whose marks are on the device.
+    marked: Option<Rect>,
     /// What the tile's textures hold since the last call, as it was read back.
     held: Option<Held>,
     seed: u32,
@@ -184,7 +186,7 @@ impl GpuEngine {
         if let Some(error) = errors.into_iter().flatten().next() {
             return Err(unable(format!("the kernel was refused: {error}")));
         }
-        let counts_trips = kernel.access == Access::Tree;
+        let seen = (kernel.sight > 0).then(|| SeenLights::new(world, settings, kernel.sight));
         let mut engine = Self {
             kernel,
             pipeline,
@@ -192,7 +194,8 @@ impl GpuEngine {
             film_layout,
             params,
             tile: None,
-            seen: counts_trips.then(|| SeenLights::new(world, settings.size)),
+            seen,
+            marked: None,
             held: None,
             seed: settings.seed,
             seconds_per_path: None,
@@ -255,8 +258,9 @@ impl GpuEngine {
                 .gpu
                 .device
                 .push_error_scope(wgpu::ErrorFilter::Validation);
-            let counts = self.counts_trips();
-            let tile = Tile::new(&self.gpu, &self.film_layout, &self.params, size, counts);
+            self.marked = None;
+            let marks = self.seen.is_some();
+            let tile = Tile::new(&self.gpu, &self.film_layout, &self.params, size, marks);
             let invalid = pollster::block_on(invalid.pop());
             // What failed for want of memory is invalid where it is used: the first cause is told.
             if let Some(e) = pollster::block_on(oom.pop()).or(invalid) {
@@ -409,8 +413,9 @@ impl GpuEngine {
             .tile
             .as_ref()
             .ok_or_else(|| EngineError::Device("no tile".into()))?;
-        if let Some(seen) = &self.seen {
-            tile.upload_seen(&self.gpu, &seen.mark(rect));
+        if let Some(seen) = self.seen.as_mut().filter(|_| self.marked != Some(rect)) {
+            tile.upload_seen(&self.gpu, seen.marks(rect));
+            self.marked = Some(rect);
         }
         let work = Work::new(rect, parts);
         tile.upload_ranges(&self.gpu, &work.ranges());

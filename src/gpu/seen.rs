@@ -1,8 +1,51 @@
-//! Which pixels may see a light directly: where lights are many, the host looks once instead of the kernel again and again.
+//! Which pixels may see a light: for these the kernel sends extra camera rays, *glances*.
+//!
+//! Any answer makes the same expected picture. What is marked are the pixels about a light's disk, and those that show the
+//! edge of its image in a mirror or in glass, or any part of it where chance decides between reflection and
+//! refraction.
 
 use crate::film::coverage::Rect;
-use crate::world::World;
+use crate::kernel::BRANCH_SHIFT;
+use crate::reference::camera::camera_ray;
+use crate::reference::{Estimator, Hit, Met, Ray, Tracer};
+use crate::scene::Bsdf;
+use crate::settings::Settings;
+use crate::world::{Geometry, World, WorldCamera};
 use glam::DVec3;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::ops::RangeInclusive;
+
+/// Vertices at which a ray that refracts wherever it can may be reflected instead.
+const TURNS: usize = 3;
+
+/// Pictures narrower than this are looked at between the corners of pixels too: images in them are small.
+const FINE_WIDTH: u32 = 384;
+
+/// The most parts of a pixel's side that are looked at.
+const FINEST: u32 = 4;
+
+/// Least and greatest x and y of the pixels that a ball may touch, if any.
+fn around(camera: &WorldCamera, size: [u32; 2], center: DVec3, radius: f64) -> Option<[f64; 4]> {
+    let to = center - camera.eye;
+    let pixel = camera.dx.length();
+    let [width, height] = size.map(f64::from);
+    let depth = camera.forward.dot(to);
+    if depth <= -radius {
+        return None;
+    }
+    if depth <= radius {
+        // About the plane of the eye a ball may be anywhere.
+        return Some([-2.0, width + 2.0, -2.0, height + 2.0]);
+    }
+    let x = camera.dx.dot(to) / (pixel * pixel * depth);
+    let y = camera.dy.dot(to) / (pixel * pixel * depth);
+    // Seen aslant a ball looks longer.
+    let stretch = (1.0 + (x.hypot(y) * pixel).powi(2)).sqrt();
+    let reach = radius / ((depth - radius) * pixel) * stretch + 1.0;
+    let (x, y) = (x + width / 2.0, y + height / 2.0);
+    Some([x - reach, x + reach, y - reach, y + reach])
+}
 
 /// A light that faces the eye.
 struct SeenLight {
@@ -33,6 +76,229 @@ impl SeenLight {
     }
 }
 
+/// The light that a ray reaches by way of mirrors and glass.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Reached {
+    /// 1 + its number; 0: none.
+    light: u16,
+    /// Number of its vertex.
+    depth: u8,
+    /// Whether glass might have sent the ray another way.
+    by_chance: bool,
+}
+
+/// What is reached by way of refraction wherever it is possible; and, for each of the first vertices, by reflection there
+/// instead.
+type Sights = [Reached; 1 + TURNS];
+
+/// What mirrors and glass show of lights.
+struct Shown {
+    tracer: Tracer,
+    /// The last vertex at which lights are looked for.
+    sight: u32,
+    /// Of each mirror and each thing of glass, as in [`SeenLight`].
+    around: Vec<[f64; 4]>,
+    /// Points looked at along the side of a pixel.
+    fine: u32,
+}
+
+impl Shown {
+    fn new(world: &World, settings: &Settings, sight: u32) -> Self {
+        let [width, height] = settings.size;
+        let all = Some([-2.0, f64::from(width) + 2.0, -2.0, f64::from(height) + 2.0]);
+        let ball = |center, radius| around(&world.camera, settings.size, center, radius);
+        let specular = world.primitives.iter().filter(|p| {
+            let bsdf = &world.materials[p.material];
+            matches!(bsdf, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. })
+        });
+        let bounds = specular.filter_map(|p| match p.geometry {
+            Geometry::Sphere { center, radius } | Geometry::Disk { center, radius, .. } => {
+                ball(center, radius)
+            }
+            Geometry::Cylinder {
+                base,
+                axis,
+                offsets,
+                radius,
+            } => {
+                let half = (offsets[1] - offsets[0]) / 2.0;
+                ball(base + axis * half, half.hypot(radius))
+            }
+            Geometry::Plane { .. } | Geometry::HugeSphere { .. } => all,
+        });
+        Self {
+            around: bounds.collect(),
+            tracer: Tracer::new(world.clone(), settings.clone(), Estimator::NoLightSampling),
+            sight,
+            fine: FINE_WIDTH.div_ceil(width).clamp(1, FINEST),
+        }
+    }
+
+    /// What is seen at a place of the film.
+    fn at(&self, x: f64, y: f64) -> Sights {
+        let mut sights = Sights::default();
+        let mut ray = camera_ray(
+            &self.tracer.world().camera,
+            self.tracer.settings().size,
+            x,
+            y,
+        );
+        let mut by_chance = false;
+        for depth in 1..=self.sight {
+            let Some(hit) = self.tracer.intersect(&ray) else {
+                break;
+            };
+            let Some(next) = self.tracer.specular(&hit, &ray, false) else {
+                if depth > 1 {
+                    sights[0] = self.reached(&hit, depth, by_chance);
+                }
+                break;
+            };
+            if next.medium != ray.medium {
+                by_chance = true;
+                if let Some(turned) = sights.get_mut(depth as usize) {
+                    let reflected = self.tracer.specular(&hit, &ray, true);
+                    *turned = reflected.map_or(Reached::default(), |ray| self.end(ray, depth + 1));
+                }
+            }
+            ray = next;
+        }
+        sights
+    }
+
+    /// What a ray reaches that chance has sent towards vertex `depth`.
+    fn end(&self, mut ray: Ray, depth: u32) -> Reached {
+        for depth in depth..=self.sight {
+            let Some(hit) = self.tracer.intersect(&ray) else {
+                break;
+            };
+            match self.tracer.specular(&hit, &ray, false) {
+                Some(next) => ray = next,
+                None => return self.reached(&hit, depth, true),
+            }
+        }
+        Reached::default()
+    }
+
+    fn reached(&self, hit: &Hit, depth: u32, by_chance: bool) -> Reached {
+        match hit.met {
+            Met::Light { index, front: true } if self.tracer.keeps(depth - 1) => Reached {
+                light: index as u16 + 1,
+                depth: depth as u8,
+                by_chance,
+            },
+            _ => Reached::default(),
+        }
+    }
+
+    /// What is seen at the points `columns` x `rows` of the lattice, in rows: `look` says it where a mirror may be.
+    fn grid(
+        &self,
+        columns: &RangeInclusive<i64>,
+        rows: &RangeInclusive<i64>,
+        step: i64,
+        look: impl Fn(i64, i64) -> Sights + Sync,
+    ) -> Vec<Sights> {
+        let width = (columns.end() - columns.start() + 1) as usize;
+        let height = (rows.end() - rows.start() + 1) as usize;
+        let mut sights = vec![Sights::default(); width * height];
+        let first = rows.start();
+        let rows = sights.par_chunks_exact_mut(width).enumerate();
+        rows.for_each(|(row, sights)| {
+            let j = first + row as i64;
+            let [_, y] = self.place(0, step * j);
+            let boxes = self
+                .around
+                .iter()
+                .filter(|[_, _, y0, y1]| (*y0..=*y1).contains(&y));
+            let boxes: Vec<_> = boxes.map(|[x0, x1, ..]| *x0..=*x1).collect();
+            if boxes.is_empty() {
+                return;
+            }
+            for (sights, i) in sights.iter_mut().zip(columns.clone()) {
+                let [x, _] = self.place(step * i, 0);
+                if boxes.iter().any(|b| b.contains(&x)) {
+                    *sights = look(i, j);
+                }
+            }
+        });
+        sights
+    }
+
+    /// Where on the film a point of the lattice lies.
+    fn place(&self, i: i64, j: i64) -> [f64; 2] {
+        [i, j].map(|k| k as f64 / f64::from(self.fine))
+    }
+
+    /// Marks the pixels of `rect`.
+    fn mark(&self, rect: Rect, marks: &mut [u32]) {
+        let fine = i64::from(self.fine);
+        // All points of the pixels and those next to them; of every other row and column as many more as are compared.
+        let points = |first: u32, end: u32| fine * i64::from(first) - 1..=fine * i64::from(end) + 1;
+        let (columns, rows) = (points(rect.x0, rect.x1), points(rect.y0, rect.y1));
+        let coarse = |points: &RangeInclusive<i64>| {
+            points.start().div_euclid(2) - 1..=points.end().div_euclid(2) + 2
+        };
+        let (coarse_columns, coarse_rows) = (coarse(&columns), coarse(&rows));
+        let at = |i: i64, j: i64| {
+            let [x, y] = self.place(i, j);
+            self.at(x, y)
+        };
+        let few = self.grid(&coarse_columns, &coarse_rows, 2, |i, j| at(2 * i, 2 * j));
+        let across = (coarse_columns.end() - coarse_columns.start() + 1) as usize;
+        let sights = self.grid(&columns, &rows, 1, |i, j| {
+            let x = (i.div_euclid(2) - coarse_columns.start()) as usize;
+            let y = (j.div_euclid(2) - coarse_rows.start()) as usize;
+            let known = few[y * across + x];
+            if i % 2 == 0 && j % 2 == 0 {
+                return known;
+            }
+            // Between points that all show the same nothing else is looked for.
+            let mut around = (y - 1..=y + 2).map(|y| &few[y * across + x - 1..][..4]);
+            if around.all(|row| row.iter().all(|s| *s == known)) {
+                known
+            } else {
+                at(i, j)
+            }
+        });
+        let across = (columns.end() - columns.start() + 1) as usize;
+        let (width, fine) = (rect.width() as usize, self.fine as usize);
+        let rows = marks.par_chunks_exact_mut(width).enumerate();
+        rows.for_each(|(y, row)| {
+            let own = &sights[y * fine * across..][..(fine + 3) * across];
+            if own.iter().all(|s| *s == Sights::default()) {
+                return;
+            }
+            for (x, mark) in row.iter_mut().enumerate() {
+                let own = |j: usize| &sights[(y * fine + j) * across + x * fine..][..fine + 3];
+                *mark = mark_of((0..fine + 3).flat_map(own));
+            }
+        });
+    }
+}
+
+/// The mark of a pixel that has these sights at and about it: see [`SeenLights::marks`].
+fn mark_of<'a>(sights: impl Iterator<Item = &'a Sights>) -> u32 {
+    let mut sights = sights.peekable();
+    let first = sights.peek().map_or(Sights::default(), |s| **s);
+    let (mut sight, mut branch) = (0, 0);
+    let mut note = |k: usize, reached: &Reached| {
+        sight = sight.max(reached.depth);
+        if branch == 0 {
+            branch = k as u32;
+        }
+    };
+    for sights in sights {
+        for (k, (a, b)) in first.iter().zip(sights).enumerate() {
+            if a != b || b.by_chance {
+                note(k, a);
+                note(k, b);
+            }
+        }
+    }
+    u32::from(sight) | branch << BRANCH_SHIFT
+}
+
 /// The lights that a picture may show.
 pub(super) struct SeenLights {
     lights: Vec<SeenLight>,
@@ -40,67 +306,72 @@ pub(super) struct SeenLights {
     corner: DVec3,
     dx: DVec3,
     dy: DVec3,
+    shown: Option<Shown>,
+    /// Marks of tiles, which come back several times; of so many pixels at most.
+    known: HashMap<Rect, Vec<u32>>,
+    most: u64,
 }
 
 impl SeenLights {
-    /// Of a world seen in a picture of `size` pixels. Any answer makes the same expected picture; this one holds but at the
-    /// very edge of wide pictures.
-    pub fn new(world: &World, size: [u32; 2]) -> Self {
+    /// Of a world that is rendered with `settings`, by glances that go on to vertex `sight`.
+    pub fn new(world: &World, settings: &Settings, sight: u32) -> Self {
         let c = &world.camera;
-        let pixel = c.dx.length();
-        let [width, height] = size.map(f64::from);
+        let [width, height] = settings.size.map(f64::from);
+        let faces_eye = |l: &&crate::world::WorldLight| {
+            settings.light.emitted && l.normal.dot(c.eye) > l.offset
+        };
         let project = |l: &crate::world::WorldLight| {
-            let to = l.center - c.eye;
-            if l.normal.dot(c.eye) <= l.offset {
-                return None;
-            }
-            let depth = c.forward.dot(to);
-            if depth <= -l.radius {
-                return None;
-            }
-            let around = if depth <= l.radius {
-                // About the plane of the eye a ball may be anywhere.
-                [0.0, width, 0.0, height]
-            } else {
-                let x = c.dx.dot(to) / (pixel * pixel * depth);
-                let y = c.dy.dot(to) / (pixel * pixel * depth);
-                // Seen aslant a ball looks longer.
-                let stretch = |t: f64| (1.0 + (t * pixel).powi(2)).sqrt();
-                let reach = l.radius / ((depth - l.radius) * pixel) * stretch(x.hypot(y)) + 1.0;
-                let (x, y) = (x + width / 2.0, y + height / 2.0);
-                [x - reach, x + reach, y - reach, y + reach]
-            };
             Some(SeenLight {
-                around,
-                to,
+                around: around(c, settings.size, l.center, l.radius)?,
+                to: l.center - c.eye,
                 normal: l.normal,
                 radius: l.radius,
             })
         };
+        let facing = world.lights.iter().filter(faces_eye);
         Self {
-            lights: world.lights.iter().filter_map(project).collect(),
+            lights: facing.filter_map(project).collect(),
             corner: c.forward + (0.5 - width / 2.0) * c.dx + (0.5 - height / 2.0) * c.dy,
             dx: c.dx,
             dy: c.dy,
+            shown: (sight > 1).then(|| Shown::new(world, settings, sight)),
+            known: HashMap::new(),
+            most: Rect::whole(settings.size).area(),
         }
     }
 
-    /// For every pixel of a tile, in rows, 1 if it may see one.
-    pub fn mark(&self, rect: Rect) -> Vec<u32> {
+    /// The mark of every pixel of a tile, in rows: the last vertex at which a light may be seen, 0 for nowhere; and, from bit
+    /// [`BRANCH_SHIFT`] on, at which vertex of glass half of the glances are to be reflected, 0 for none. It depends on the
+    /// pixel alone, not on the tile.
+    pub fn marks(&mut self, rect: Rect) -> &[u32] {
+        if !self.known.contains_key(&rect) {
+            let held: u64 = self.known.keys().map(Rect::area).sum();
+            if held + rect.area() > self.most {
+                self.known.clear();
+            }
+            let marks = self.mark(rect);
+            self.known.insert(rect, marks);
+        }
+        &self.known[&rect]
+    }
+
+    fn mark(&self, rect: Rect) -> Vec<u32> {
         let width = rect.width() as usize;
         let mut seen = vec![0; width * rect.height() as usize];
+        if let Some(shown) = &self.shown {
+            shown.mark(rect, &mut seen);
+        }
         // `as` keeps what lies outside within.
-        let within = |x: f64, first: u32, end: u32| (x as u32).clamp(first, end) - first;
+        let within = |x: f64, first: u32, end: u32| (x as u32).clamp(first, end);
         let half_diagonal = 0.75 * self.dx.length();
         for light in &self.lights {
             let [x0, x1, y0, y1] = light.around;
             let columns = within(x0.floor(), rect.x0, rect.x1)..within(x1.ceil(), rect.x0, rect.x1);
             for y in within(y0.floor(), rect.y0, rect.y1)..within(y1.ceil(), rect.y0, rect.y1) {
-                let left =
-                    self.corner + f64::from(rect.x0) * self.dx + f64::from(rect.y0 + y) * self.dy;
-                let row = &mut seen[y as usize * width..][..width];
+                let left = self.corner + f64::from(y) * self.dy;
+                let row = &mut seen[(y - rect.y0) as usize * width..][..width];
                 for x in columns.clone() {
-                    let pixel = &mut row[x as usize];
+                    let pixel = &mut row[(x - rect.x0) as usize];
                     if *pixel == 0 {
                         let w = left + f64::from(x) * self.dx;
                         *pixel = u32::from(light.touches(w, w.length(), half_diagonal));
@@ -116,6 +387,7 @@ impl SeenLights {
 mod tests {
     use super::*;
     use crate::scene::parse::parse_str;
+    use crate::settings::{LightParts, Overrides};
 
     #[test]
     fn a_light_in_the_middle_marks_the_middle() {
@@ -126,7 +398,8 @@ mod tests {
             [[light]]\ncenter = [1, 0, 0]\nnormal = [0, 0, -1]\nradius = 0.2\nradiance = [1, 1, 1]\n\
             [[light]]\ncenter = [0, 0, 9]\nnormal = [0, 0, -1]\nradius = 0.2\nradiance = [1, 1, 1]\n";
         let scene = parse_str("x.toml".as_ref(), text).expect("a scene");
-        let seen = SeenLights::new(&World::new(&scene, [64, 48]), [64, 48]);
+        let settings = Settings::resolve(&scene, &Overrides::default());
+        let seen = SeenLights::new(&World::new(&scene, [64, 48]), &settings, 1);
         // A pixel is 2 x 4 tan 20 / 48 = 0.0607 wide there: the light reaches 3.3 pixels from the middle.
         let part = Rect {
             x0: 30,
@@ -148,5 +421,128 @@ mod tests {
             counts[*seen as usize] += 1;
         }
         assert!(counts[0] > 100 && counts[1] > 20, "{counts:?}");
+    }
+
+    const LOOKING: &str = "[camera]\neye = [0, 0, 4]\nlook_at = [0, 0, 0]\nvfov = 40\nresolution = [512, 384]\n\
+        [material.silver]\ntype = 'mirror'\nreflectance = [1, 1, 1]\n\
+        [material.glass]\ntype = 'dielectric'\nior = 1.5\n\
+        [[light]]\ncenter = [0, 0, 9]\nnormal = [0, 0, -1]\nradius = 1.5\nradiance = [1, 1, 1]\n";
+
+    /// A scene looked at along the z axis, with a large lamp behind the eye.
+    fn looking(things: &str, light: LightParts) -> SeenLights {
+        let scene = parse_str("x.toml".as_ref(), &format!("{LOOKING}{things}")).expect("a scene");
+        let flags = Overrides {
+            light: Some(light),
+            ..Overrides::default()
+        };
+        let settings = Settings::resolve(&scene, &flags);
+        SeenLights::new(&World::new(&scene, settings.size), &settings, 6)
+    }
+
+    /// The distance from the middle of the picture, in pixels, at which a ball of radius 1 there shows the lamp's edge.
+    fn edge_in_the_ball() -> f64 {
+        // Where the ray that meets the ball at this angle from its pole comes to the lamp's plane.
+        let away = |angle: f64| {
+            let (sin, cos) = angle.sin_cos();
+            let d = DVec3::new(sin, 0.0, cos - 4.0).normalize();
+            let n = DVec3::new(sin, 0.0, cos);
+            let onward = d - 2.0 * d.dot(n) * n;
+            sin + onward.x / onward.z * (9.0 - cos)
+        };
+        let (mut inside, mut outside) = (0.0, 0.7);
+        for _ in 0..60 {
+            let middle = (inside + outside) / 2.0;
+            if away(middle) < 1.5 {
+                inside = middle;
+            } else {
+                outside = middle;
+            }
+        }
+        let tangent = f64::sin(inside) / (4.0 - f64::cos(inside));
+        tangent * 192.0 / 20f64.to_radians().tan()
+    }
+
+    const WHOLE: Rect = Rect {
+        x0: 0,
+        y0: 0,
+        x1: 512,
+        y1: 384,
+    };
+
+    #[test]
+    fn a_lamp_in_a_mirror_ball_marks_the_ring_where_its_edge_is() {
+        let ball = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'silver'\n";
+        let edge = edge_in_the_ball();
+        assert!((10.0..60.0).contains(&edge), "{edge}");
+        for (k, mark) in looking(ball, LightParts::ALL)
+            .mark(WHOLE)
+            .iter()
+            .enumerate()
+        {
+            let [x, y] = [k % 512, k / 512].map(|k| k as f64 + 0.5);
+            let off = ((x - 256.0).hypot(y - 192.0) - edge).abs();
+            if off < 0.7 {
+                assert_eq!(*mark, 2, "({x}, {y})");
+            } else if off > 3.0 {
+                assert_eq!(*mark, 0, "({x}, {y})");
+            }
+        }
+        let emitted = LightParts {
+            direct: false,
+            indirect: false,
+            ..LightParts::ALL
+        };
+        let marks = looking(ball, emitted).mark(WHOLE);
+        assert!(marks.iter().all(|m| *m == 0), "nothing is kept of it");
+    }
+
+    #[test]
+    fn a_lamp_in_glass_is_marked_all_over_and_half_of_the_glances_are_reflected() {
+        let ball = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'glass'\n";
+        let direct = LightParts {
+            emitted: false,
+            direct: true,
+            indirect: false,
+        };
+        let edge = edge_in_the_ball();
+        for (k, mark) in looking(ball, direct).mark(WHOLE).iter().enumerate() {
+            let [x, y] = [k % 512, k / 512].map(|k| k as f64 + 0.5);
+            let off = (x - 256.0).hypot(y - 192.0) - edge;
+            if off < 0.7 {
+                assert_eq!(*mark, 2 | 1 << BRANCH_SHIFT, "({x}, {y})");
+            } else if off > 3.0 {
+                assert_eq!(*mark, 0, "({x}, {y})");
+            }
+        }
+    }
+
+    #[test]
+    fn marks_of_a_part_are_those_of_the_whole() {
+        let text = include_str!("../../scenes/three_materials.toml");
+        let scene = parse_str("x.toml".as_ref(), text).expect("a scene");
+        for size in [[90, 70], [400, 300]] {
+            let flags = Overrides {
+                size: Some(size),
+                ..Overrides::default()
+            };
+            let settings = Settings::resolve(&scene, &flags);
+            let world = World::new(&scene, size);
+            let mut seen = SeenLights::new(&world, &settings, 6);
+            let whole = seen.mark(Rect::whole(size));
+            assert!(whole.contains(&1) && whole.iter().any(|m| *m > 1));
+            for [x0, y0, x1, y1] in [
+                [0, 0, 90, 70],
+                [31, 17, 64, 45],
+                [50, 33, 51, 34],
+                [0, 40, 89, 70],
+            ] {
+                let part = Rect { x0, y0, x1, y1 };
+                let rows = (y0..y1)
+                    .map(|y| &whole[(y * size[0] + x0) as usize..][..part.width() as usize]);
+                let expected: Vec<u32> = rows.flatten().copied().collect();
+                assert_eq!(seen.marks(part), expected, "{part:?} of {size:?}");
+                assert_eq!(seen.marks(part), expected, "kept: {part:?} of {size:?}");
+            }
+        }
     }
 }

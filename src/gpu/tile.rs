@@ -137,7 +137,7 @@ impl Tile {
             .write_buffer(&self.left, LEFT_HEAD, bytemuck::cast_slice(ranges));
     }
 
-    /// Says which pixels, rows of the tile, may see a light.
+    /// Says up to which vertex glances look for lights, in rows of the tile.
     pub fn upload_seen(&self, gpu: &Gpu, seen: &[u32]) {
         let at = LEFT_HEAD + 2 * 4 * seen.len() as u64;
         gpu.queue

@@ -29,11 +29,17 @@ use trees::Parted;
 /// Squared, the camera rays that a sample sends in a pixel that may see a light.
 const GLANCES: u32 = 4;
 
+/// The last vertex at which they look for one. A ball of glass takes two before it, and one more in a mirror three.
+const LONGEST_GLANCE: u32 = 6;
+
 /// The fourth powers of radii outside this range come near the ends of f32.
 const ORDINARY_RADII: RangeInclusive<f64> = 1e-8..=1e8;
 
-/// Glances at more surfaces would use up the loop trips that an older driver grants.
-const MOST_GLANCED_AT: u64 = 500;
+/// Where in a mark it stands at which vertex of glass half of the glances are reflected.
+pub(crate) const BRANCH_SHIFT: u32 = 8;
+
+/// So many of the loop trips that an older driver grants may be used up by glances.
+const TRIPS_FOR_GLANCES: u64 = 16_384;
 
 /// Tags of [`Bsdf`] in `Material.kind`; the names are the kernel's constants.
 pub(crate) const MATERIAL_TAGS: [&str; 4] = [
@@ -115,12 +121,15 @@ pub struct Kernel {
     /// The most loop trips that one sample can take of an invocation; 0 where the kernel counts them itself, and leaves
     /// what it cannot finish to the next dispatch.
     pub trips_per_sample: u64,
+    /// The last vertex at which it looks for lights by extra camera rays, in pixels that the host marks; 0: it reads no marks.
+    pub sight: u32,
 }
 
 /// Composes the kernel of `world` under `settings`; `access` overrides the rule of [`Access::choose`].
 pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Kernel {
     let access = access.unwrap_or_else(|| Access::choose(world));
     let features = features(world, settings, access);
+    let sight = sight(world, settings, access);
     let mut wgsl = String::from("// Made for one scene by etendue.\n\n");
     wgsl.push_str(&scene_text(world, settings, access, &features));
     for (name, text) in PATH {
@@ -133,11 +142,12 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     let trips_per_sample = match access {
         Access::Tree => 0,
         Access::Baked | Access::Buffers => {
-            let vertices = u64::from(last_depth(settings));
-            let trips = vertices.saturating_mul(trips_at_vertex(world, settings, access, None))
-                + trips_at_start(world, access, &features);
+            // While one lane glances another may do all that a vertex asks for.
+            let turns = u64::from(last_depth(settings)) + u64::from(GLANCES * GLANCES * sight);
+            let trips = turns
+                .saturating_mul(trips_at_vertex(world, settings, access, None))
+                .saturating_add(STRATA_LOOP);
             // The loop over turns is in one of its own then, which goes round no more often.
-            let turns = vertices + u64::from(GLANCES * GLANCES);
             trips
                 + if features.contains("IMAGES") {
                     turns
@@ -150,6 +160,7 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
         wgsl,
         access,
         trips_per_sample,
+        sight,
     }
 }
 
@@ -185,18 +196,35 @@ fn trips_at_vertex(
     1 + inner + shadow_loop + hidden
 }
 
-/// The loop trips before the first vertex of a sample, and those of its glances.
-fn trips_at_start(world: &World, access: Access, features: &BTreeSet<&str>) -> u64 {
-    let strata_loop = 32;
-    let ray = match access {
-        Access::Buffers => surfaces(world),
-        Access::Baked | Access::Tree => 0,
-    };
-    if features.contains("SEEN_LIGHTS") {
-        u64::from(GLANCES * GLANCES) * (1 + ray) + strata_loop
-    } else {
-        strata_loop
+/// The loop trips that the choice of a place in the pixel can take.
+const STRATA_LOOP: u64 = 32;
+
+/// The last vertex at which glances look for lights; 0: there are none.
+fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
+    let eye = world.camera.eye;
+    let faces_eye = |l: &WorldLight| l.normal.dot(eye) > l.offset;
+    let seen = settings.light.emitted && world.lights.iter().any(faces_eye);
+    if access == Access::Tree {
+        // The host looks at all surfaces for what mirrors show, which would take too long.
+        return u32::from(seen);
     }
+    let affordable = TRIPS_FOR_GLANCES
+        / u64::from(GLANCES * GLANCES)
+        / trips_at_vertex(world, settings, access, None);
+    let mut specular = world
+        .primitives
+        .iter()
+        .map(|p| &world.materials[p.material]);
+    let shown = specular.any(|b| matches!(b, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. }))
+        && !world.lights.is_empty()
+        && world.primitives.len() + world.lights.len() <= BAKED_LIMIT;
+    let wanted = if shown {
+        LONGEST_GLANCE.min(last_depth(settings))
+    } else {
+        1
+    };
+    let sight = wanted.min(affordable as u32);
+    if sight > 1 || seen { sight } else { 0 }
 }
 
 /// All that the path loop of a scene calls: constants, modules, and what is generated for the scene.
@@ -212,7 +240,8 @@ fn scene_text(
     let parted = (access == Access::Tree).then(|| Parted::new(world));
     if let Some(parted) = &parted {
         let vertex = trips_at_vertex(world, settings, access, Some(parted));
-        let start = trips_at_start(world, access, features);
+        let glances = u64::from(GLANCES * GLANCES * sight(world, settings, access));
+        let start = glances + STRATA_LOOP;
         let _ = writeln!(
             s,
             "const TRIPS_AT_VERTEX: u32 = {vertex}u;\nconst TRIPS_AT_START: u32 = {start}u;"
@@ -378,14 +407,9 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
     let near = sampling && diffuse && near::light_near_diffuse(world);
     set("MIS_DIFFUSE", near);
     set("MIS", sampling && (phong || near));
-    let eye = world.camera.eye;
-    let faces_eye = |l: &WorldLight| l.normal.dot(eye) > l.offset;
-    set(
-        "SEEN_LIGHTS",
-        settings.light.emitted
-            && (access == Access::Tree || surfaces(world) <= MOST_GLANCED_AT)
-            && world.lights.iter().any(faces_eye),
-    );
+    let sight = sight(world, settings, access);
+    set("SEEN_LIGHTS", sight > 0);
+    set("GLANCES_GO_ON", sight > 1);
     set("WHITTED", settings.integrator == Integrator::Whitted);
     set("ALL_LIGHT", settings.light == LightParts::ALL);
     set(
@@ -435,6 +459,7 @@ fn constants(world: &World, settings: &Settings) -> String {
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
     constant("GLANCES", "u32", format!("{GLANCES}u"));
+    constant("BRANCH_SHIFT", "u32", format!("{BRANCH_SHIFT}u"));
     constant("BLOCK", "u32", format!("{BLOCK}u"));
     constant("REPLICATES", "u32", format!("{REPLICATES}u"));
     constant("STRATA", "u32", format!("{}u", settings.strata));

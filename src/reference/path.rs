@@ -136,8 +136,31 @@ impl Tracer {
         traced
     }
 
+    /// Where `ray` goes on from a mirror, or from glass: into it or out of it if it can, or by reflection if it `reflects`.
+    /// `None` from other surfaces.
+    pub fn specular(&self, hit: &Hit, ray: &Ray, reflects: bool) -> Option<Ray> {
+        let Met::Primitive(index) = hit.met else {
+            return None;
+        };
+        let primitive = &self.world.primitives[index];
+        if !matches!(
+            self.world.materials[primitive.material],
+            Bsdf::Mirror { .. } | Bsdf::Dielectric { .. }
+        ) {
+            return None;
+        }
+        let u = [if reflects { 1.0 } else { 0.0 }; 3];
+        let scattered = self.scatter(primitive, hit, ray, u)?;
+        Some(Ray {
+            origin: hit.point,
+            direction: scattered.direction,
+            medium: scattered.medium,
+            face: hit.face,
+        })
+    }
+
     /// Whether the picture keeps light that has been scattered `times` times.
-    fn keeps(&self, times: u32) -> bool {
+    pub fn keeps(&self, times: u32) -> bool {
         let parts = &self.settings.light;
         match times {
             0 => parts.emitted,
