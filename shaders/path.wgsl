@@ -62,8 +62,8 @@ struct Path {
     glances: u32,
 #endif
 #if GLANCES_GO_ON
-    // Is one of as many glances that are reflected by glass now as go into it.
-    splits: bool,
+    // What it does at glass: see scatter.wgsl.
+    way: u32,
 #endif
 #if MIS
     // Density of the last scattering, per solid angle; 0: light met by chance is all counted by light sampling.
@@ -107,8 +107,8 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     // A workgroup is a block of 8 x 8 pixels, and its lanes fill it in squares of 4 x 4 and halves of 8 x 4: however many a
     // device takes side by side, their rays go the same way for longer than those of a row.
     let block = (params.first_group + group.x) * params.stride % params.groups;
-    let across = (params.size.x + 7u) / 8u;
-    let texel = 8u * vec2u(block % across, block / across)
+    let blocks = (params.size.x + 7u) / 8u;
+    let texel = 8u * vec2u(block % blocks, block / blocks)
         + vec2u((lane & 3u) | ((lane >> 2u) & 4u), ((lane >> 2u) & 3u) | ((lane >> 3u) & 4u));
     if any(texel >= params.size) {
         return;
@@ -147,15 +147,18 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     // And at which vertex one half of them goes into glass and the other is reflected; 0: that is left to chance everywhere.
     let branch = mark >> BRANCH_SHIFT;
     let sight = mark & ((1u << BRANCH_SHIFT) - 1u);
+    let across = select(CHAIN_GLANCES, GLANCES, sight <= 1u);
 #else
     let sight = mark;
+    let across = GLANCES;
 #endif
-    let glances = select(0u, GLANCES * GLANCES, sight > 0u);
+    let glances = select(0u, across * across, sight > 0u);
 #else
+    let across = GLANCES;
     let glances = 0u;
 #endif
     var path = begin(glances);
-    path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances));
+    path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances, across));
     // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
 #if TREE
     while s < end && going {
@@ -180,7 +183,7 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         let blind = path.depth <= sight && !glance;
 #endif
         if hit.key < LIGHT_KEYS && !blind {
-            path.radiance += path.beta * emission(path, hit) * select(1.0, 1.0 / f32(GLANCES * GLANCES), glance);
+            path.radiance += path.beta * emission(path, hit) * select(1.0, 1.0 / f32(across * across), glance);
         }
 #if GLANCES_GO_ON
         let goes_on = !glance || path.depth < sight;
@@ -198,7 +201,11 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 #if GLANCES_GO_ON
             // Random numbers of its own for each glance.
             let seed = params.seed ^ (path.glances * 0x9e3779b9u);
-            path.splits = glance && path.depth == branch;
+            // Where the mark says so half of them are reflected: the black or the white fields of a chess board, by the toss
+            // of a coin for each sample.
+            let coin = hash_pixel(key, s, params.seed ^ 0x7f4a7c15u).x;
+            let field = (path.glances ^ ((path.glances - 1u) >> (across >> 1u)) ^ coin) & 1u;
+            path.way = select(BY_CHANCE, field, glance && path.depth == branch);
 #else
             let seed = params.seed;
 #endif
@@ -219,53 +226,45 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             alive = true;
         }
 #endif
-        var glances_left = 0u;
-#if SEEN_LIGHTS
-#if GLANCES_GO_ON
-        if glance && !alive {
-            let seen = path.radiance;
-            path = begin(path.glances - 1u);
-            path.radiance = seen;
-            glances_left = path.glances;
-        }
-#else
-        if glance {
-            path.glances -= 1u;
-            glances_left = path.glances;
-        }
-#endif
-#endif
-        if !alive && !glance {
-            // Add the sample, and start the next at once: no lane waits for a longer path.
-            let l = path.radiance;
-            let y = dot(l, vec3f(0.2126, 0.7152, 0.0722));
-            // WGSL may assume that there is no NaN: look at the bits.
-            let finite = (bitcast<u32>(y) & 0x7fffffffu) < 0x7f800000u;
-            let replicate = s / ROUND_SAMPLES % REPLICATES;
-            if finite {
-                // The square serves the error of a single replicate alone; it must not overflow.
-                let bounded = fmin(y, 1.0e15);
-                let added = vec4f(l, bounded * bounded);
-                sum_0 = select(sum_0, sum_0 + added, replicate == 0u);
-                sum_1 = select(sum_1, sum_1 + added, replicate == 1u);
-                sum_2 = select(sum_2, sum_2 + added, replicate == 2u);
-                sum_3 = select(sum_3, sum_3 + added, replicate == 3u);
-            } else {
-                let at = s % BLOCK + 1u;
-                count.y |= select(0u, at << 16u, count.y < 0x10000u);
-                let one = 1u << (16u * (replicate % 2u));
-                count.z += select(0u, one, replicate < 2u);
-                count.w += select(one, 0u, replicate < 2u);
-            }
-            s += 1u;
-            path = begin(glances);
-            glances_left = glances;
-#if TREE
-            before = count;
-#endif
-        }
         if !alive {
-            path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances_left));
+#if SEEN_LIGHTS
+            let more = select(glances, path.glances - 1u, glance);
+            let seen = select(vec3f(0.0), path.radiance, glance);
+#else
+            let more = 0u;
+#endif
+            if !glance {
+                // Add the sample, and start the next at once: no lane waits for a longer path.
+                let l = path.radiance;
+                let y = dot(l, vec3f(0.2126, 0.7152, 0.0722));
+                // WGSL may assume that there is no NaN: look at the bits.
+                let finite = (bitcast<u32>(y) & 0x7fffffffu) < 0x7f800000u;
+                let replicate = s / ROUND_SAMPLES % REPLICATES;
+                if finite {
+                    // The square serves the error of a single replicate alone; it must not overflow.
+                    let bounded = fmin(y, 1.0e15);
+                    let added = vec4f(l, bounded * bounded);
+                    sum_0 = select(sum_0, sum_0 + added, replicate == 0u);
+                    sum_1 = select(sum_1, sum_1 + added, replicate == 1u);
+                    sum_2 = select(sum_2, sum_2 + added, replicate == 2u);
+                    sum_3 = select(sum_3, sum_3 + added, replicate == 3u);
+                } else {
+                    let at = s % BLOCK + 1u;
+                    count.y |= select(0u, at << 16u, count.y < 0x10000u);
+                    let one = 1u << (16u * (replicate % 2u));
+                    count.z += select(0u, one, replicate < 2u);
+                    count.w += select(one, 0u, replicate < 2u);
+                }
+                s += 1u;
+#if TREE
+                before = count;
+#endif
+            }
+            path = begin(more);
+#if SEEN_LIGHTS
+            path.radiance = seen;
+#endif
+            path.ray = camera_ray(pixel, film_position(key, s, params.seed, more, across));
         }
 #if IMAGES
     } // Turns; their lines stand as in kernels without this loop.

@@ -64,6 +64,13 @@ fn emission(path: Path, hit: Hit) -> vec3f {
 // of this one's efficiency, and ending what is below 1 from the fifth vertex on, whatever is shown, 0.72 to 1.01.
 const LITTLE: f32 = 0.7;
 
+#if GLANCES_GO_ON
+// What a path does where it meets glass.
+const CROSSES: u32 = 0u;
+const IS_REFLECTED: u32 = 1u;
+const BY_CHANCE: u32 = 2u;
+#endif
+
 // Scatters the path where it met a surface: direct light, then a new direction. False when it ends.
 fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<function, vec4u>) -> bool {
     let surface = surface_at(hit.key);
@@ -312,10 +319,8 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
         var crosses = u.choices.y < fresnel.transmitted;
 #if GLANCES_GO_ON
         // What glass reflects is a twentieth of what comes: left to chance it would be noise. Half of the glances see it, and
-        // weigh less: the black or the white fields of a chess board, by the toss of a coin for each sample.
-        let splits = (*path).splits;
-        let coin = hash_pixel(draw_key.x, draw_key.y, params.seed ^ 0x7f4a7c15u).x;
-        crosses = select(crosses, ((*path).glances ^ (((*path).glances - 1u) / GLANCES) ^ coin) % 2u == 0u, splits);
+        // weigh less.
+        crosses = select((*path).way == CROSSES, crosses, (*path).way == BY_CHANCE);
         let share = 2.0 * select(1.0 - fresnel.transmitted, fresnel.transmitted, crosses);
 #endif
         if crosses {
@@ -327,7 +332,7 @@ fn scatter_at(path: ptr<function, Path>, hit: Hit, draw_key: vec4u, count: ptr<f
             weight = vec3f(1.0);
         }
 #if GLANCES_GO_ON
-        weight *= select(1.0, share, splits);
+        weight *= select(share, 1.0, (*path).way == BY_CHANCE);
 #endif
         (*path).specular = true;
     }
