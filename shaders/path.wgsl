@@ -145,11 +145,11 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     let mark = left.next[2u * params.pixels + index];
 #if GLANCES_GO_ON
     // And at which vertex one half of them goes into glass and the other is reflected; 0: that is left to chance everywhere.
-    let branch = mark >> BRANCH_SHIFT;
-    let sight = mark & ((1u << BRANCH_SHIFT) - 1u);
-    let across = select(CHAIN_GLANCES, GLANCES, sight <= 1u);
+    let branch = (mark >> BRANCH_SHIFT) & 0xffu;
+    let sight = mark & 0xffu;
+    let across = select(CHAIN_GLANCES, GLANCES, (mark >> DIRECT_SHIFT) == 1u);
 #else
-    let sight = mark;
+    let sight = mark & 0xffu;
     let across = GLANCES;
 #endif
     let glances = select(0u, across * across, sight > 0u);

@@ -36,6 +36,15 @@ impl LightParts {
         direct: true,
         indirect: true,
     };
+
+    /// Whether light that has been scattered `times` times belongs to them.
+    pub fn keeps(&self, times: u32) -> bool {
+        match times {
+            0 => self.emitted,
+            1 => self.direct,
+            _ => self.indirect,
+        }
+    }
 }
 
 /// Flags that override the scene's hints; `None` leaves the choice to scene or default.

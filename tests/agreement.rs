@@ -135,7 +135,10 @@ fn faults_are_seen(s: &Scene) -> Result<(), Failed> {
             "let blind = path.depth <= min(sight, 1u)",
         ),
         // What glass reflects and what it lets through, as if each were half of the light.
-        ("weight *= select(1.0, share, splits);", ""),
+        (
+            "weight *= select(share, 1.0, (*path).way == BY_CHANCE);",
+            "",
+        ),
     ] {
         let runs = (0..RUNS).map(|k| {
             let settings = settings(s, SIZE, k);

@@ -5,11 +5,11 @@
 //! refraction.
 
 use crate::film::coverage::Rect;
-use crate::kernel::BRANCH_SHIFT;
+use crate::kernel::{BRANCH_SHIFT, DIRECT_SHIFT};
 use crate::reference::camera::camera_ray;
 use crate::reference::{Estimator, Hit, Met, Ray, Tracer};
 use crate::scene::Bsdf;
-use crate::settings::Settings;
+use crate::settings::{LightParts, Settings};
 use crate::world::{Geometry, World, WorldCamera};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -182,7 +182,7 @@ impl Shown {
 
     fn reached(&self, hit: &Hit, depth: u32, by_chance: bool) -> Reached {
         match hit.met {
-            Met::Light { index, front: true } if self.tracer.keeps(depth - 1) => Reached {
+            Met::Light { index, front: true } => Reached {
                 light: index as u16 + 1,
                 depth: depth as u8,
                 by_chance,
@@ -284,8 +284,8 @@ fn mark_of<'a>(sights: impl Iterator<Item = &'a Sights>) -> u32 {
     let (mut sight, mut branch) = (0, 0);
     let mut note = |k: usize, reached: &Reached| {
         sight = sight.max(reached.depth);
-        if branch == 0 {
-            branch = k as u32;
+        if k > 0 && (branch == 0 || k < branch) {
+            branch = k;
         }
     };
     for sights in sights {
@@ -296,7 +296,7 @@ fn mark_of<'a>(sights: impl Iterator<Item = &'a Sights>) -> u32 {
             }
         }
     }
-    u32::from(sight) | branch << BRANCH_SHIFT
+    u32::from(sight) | (branch as u32) << BRANCH_SHIFT
 }
 
 /// The lights that a picture may show.
@@ -307,6 +307,8 @@ pub(super) struct SeenLights {
     dx: DVec3,
     dy: DVec3,
     shown: Option<Shown>,
+    /// The light that is kept.
+    light: LightParts,
     /// Marks of tiles, which come back several times; of so many pixels at most.
     known: HashMap<Rect, Vec<u32>>,
     most: u64,
@@ -317,9 +319,7 @@ impl SeenLights {
     pub fn new(world: &World, settings: &Settings, sight: u32) -> Self {
         let c = &world.camera;
         let [width, height] = settings.size.map(f64::from);
-        let faces_eye = |l: &&crate::world::WorldLight| {
-            settings.light.emitted && l.normal.dot(c.eye) > l.offset
-        };
+        let faces_eye = |l: &&crate::world::WorldLight| l.normal.dot(c.eye) > l.offset;
         let project = |l: &crate::world::WorldLight| {
             Some(SeenLight {
                 around: around(c, settings.size, l.center, l.radius)?,
@@ -335,14 +335,16 @@ impl SeenLights {
             dx: c.dx,
             dy: c.dy,
             shown: (sight > 1).then(|| Shown::new(world, settings, sight)),
+            light: settings.light,
             known: HashMap::new(),
             most: Rect::whole(settings.size).area(),
         }
     }
 
     /// The mark of every pixel of a tile, in rows: the last vertex at which a light may be seen, 0 for nowhere; and, from bit
-    /// [`BRANCH_SHIFT`] on, at which vertex of glass half of the glances are to be reflected, 0 for none. It depends on the
-    /// pixel alone, not on the tile.
+    /// [`BRANCH_SHIFT`] on, at which vertex of glass half of the glances are to be reflected, 0 for none; and, from bit
+    /// [`DIRECT_SHIFT`] on, 1 where a light may be seen directly. It depends on the pixel alone, not on the tile; nor on the light
+    /// that is kept, but that it is 0 where nothing that might be seen is.
     pub fn marks(&mut self, rect: Rect) -> &[u32] {
         if !self.known.contains_key(&rect) {
             let held: u64 = self.known.keys().map(Rect::area).sum();
@@ -372,11 +374,17 @@ impl SeenLights {
                 let row = &mut seen[(y - rect.y0) as usize * width..][..width];
                 for x in columns.clone() {
                     let pixel = &mut row[(x - rect.x0) as usize];
-                    if *pixel == 0 {
-                        let w = left + f64::from(x) * self.dx;
-                        *pixel = u32::from(light.touches(w, w.length(), half_diagonal));
+                    let w = left + f64::from(x) * self.dx;
+                    if *pixel >> DIRECT_SHIFT == 0 && light.touches(w, w.length(), half_diagonal) {
+                        *pixel = (*pixel).max(1) | 1 << DIRECT_SHIFT;
                     }
                 }
+            }
+        }
+        for mark in &mut seen {
+            let sight = *mark & 0xff;
+            if !(0..sight).any(|scatterings| self.light.keeps(scatterings)) {
+                *mark = 0;
             }
         }
         seen
@@ -387,7 +395,7 @@ impl SeenLights {
 mod tests {
     use super::*;
     use crate::scene::parse::parse_str;
-    use crate::settings::{LightParts, Overrides};
+    use crate::settings::Overrides;
 
     #[test]
     fn a_light_in_the_middle_marks_the_middle() {
@@ -414,11 +422,11 @@ mod tests {
             let away = (x + 0.5 - 32.0).hypot(y + 0.5 - 24.0);
             // A pixel reaches 0.71 from its middle.
             if away < 3.3 + 0.7 {
-                assert_eq!(*seen, 1, "({x}, {y})");
+                assert_eq!(*seen, DIRECT, "({x}, {y})");
             } else if away > 3.3 + 1.5 {
                 assert_eq!(*seen, 0, "({x}, {y})");
             }
-            counts[*seen as usize] += 1;
+            counts[usize::from(*seen > 0)] += 1;
         }
         assert!(counts[0] > 100 && counts[1] > 20, "{counts:?}");
     }
@@ -462,6 +470,9 @@ mod tests {
         tangent * 192.0 / 20f64.to_radians().tan()
     }
 
+    /// The mark where nothing but a light is seen.
+    const DIRECT: u32 = 1 | 1 << DIRECT_SHIFT;
+
     const WHOLE: Rect = Rect {
         x0: 0,
         y0: 0,
@@ -487,33 +498,40 @@ mod tests {
                 assert_eq!(*mark, 0, "({x}, {y})");
             }
         }
-        let emitted = LightParts {
+        let indirect = LightParts {
+            emitted: false,
             direct: false,
-            indirect: false,
             ..LightParts::ALL
         };
-        let marks = looking(ball, emitted).mark(WHOLE);
+        let marks = looking(ball, indirect).mark(WHOLE);
         assert!(marks.iter().all(|m| *m == 0), "nothing is kept of it");
     }
 
     #[test]
     fn a_lamp_in_glass_is_marked_all_over_and_half_of_the_glances_are_reflected() {
         let ball = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'glass'\n";
+        let edge = edge_in_the_ball();
+        let ball_edge = f64::tan(f64::asin(0.25)) * 192.0 / 20f64.to_radians().tan();
+        let all = looking(ball, LightParts::ALL).mark(WHOLE);
+        for (k, mark) in all.iter().enumerate() {
+            let [x, y] = [k % 512, k / 512].map(|k| k as f64 + 0.5);
+            let off = (x - 256.0).hypot(y - 192.0);
+            if off < edge + 0.7 {
+                assert!(
+                    mark & 0xff >= 2 && (mark >> BRANCH_SHIFT) & 0xff == 1,
+                    "({x}, {y}): {mark}"
+                );
+            } else if off > ball_edge + 3.0 {
+                assert_eq!(*mark, 0, "({x}, {y})");
+            }
+        }
         let direct = LightParts {
             emitted: false,
             direct: true,
             indirect: false,
         };
-        let edge = edge_in_the_ball();
-        for (k, mark) in looking(ball, direct).mark(WHOLE).iter().enumerate() {
-            let [x, y] = [k % 512, k / 512].map(|k| k as f64 + 0.5);
-            let off = (x - 256.0).hypot(y - 192.0) - edge;
-            if off < 0.7 {
-                assert_eq!(*mark, 2 | 1 << BRANCH_SHIFT, "({x}, {y})");
-            } else if off > 3.0 {
-                assert_eq!(*mark, 0, "({x}, {y})");
-            }
-        }
+        let part = looking(ball, direct).mark(WHOLE);
+        assert_eq!(part, all, "parts add up to the whole");
     }
 
     #[test]
@@ -529,7 +547,7 @@ mod tests {
             let world = World::new(&scene, size);
             let mut seen = SeenLights::new(&world, &settings, 6);
             let whole = seen.mark(Rect::whole(size));
-            assert!(whole.contains(&1) && whole.iter().any(|m| *m > 1));
+            assert!(whole.contains(&DIRECT) && whole.iter().any(|m| m & 0xff > 1));
             for [x0, y0, x1, y1] in [
                 [0, 0, 90, 70],
                 [31, 17, 64, 45],

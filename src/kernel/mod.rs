@@ -29,8 +29,8 @@ use trees::Parted;
 /// Squared, the camera rays that a sample sends in a pixel that may see a light.
 const GLANCES: u32 = 4;
 
-/// The same for those that look by way of mirrors and glass, among light that is scattered twice or more, which is noisier than the
-/// edges that they see: 4 were slower by 8 % on caustic and 3 % on three_materials, for as much noise or a little less.
+/// The same where they look by way of mirrors and glass alone, unless paths have two vertices at most: indirect light is noisier
+/// than the edges that they see. 4 were slower by 8 % on caustic and 3 % on three_materials, for as much noise or a little less.
 const CHAIN_GLANCES: u32 = 2;
 
 /// The last vertex at which they look for one. A ball of glass takes two before it, and one more in a mirror three.
@@ -41,6 +41,9 @@ const ORDINARY_RADII: RangeInclusive<f64> = 1e-8..=1e8;
 
 /// Where in a mark it stands at which vertex of glass half of the glances are reflected.
 pub(crate) const BRANCH_SHIFT: u32 = 8;
+
+/// And whether a light may be seen directly.
+pub(crate) const DIRECT_SHIFT: u32 = 16;
 
 /// So many of the loop trips that an older driver grants may be used up by glances.
 const TRIPS_FOR_GLANCES: u64 = 16_384;
@@ -203,14 +206,15 @@ fn trips_at_vertex(
 /// The loop trips that the choice of a place in the pixel can take.
 const STRATA_LOOP: u64 = 32;
 
-/// The last vertex at which glances look for lights; 0: there are none.
+/// The last vertex at which glances look for lights; 0: there are none. Not by which light is kept, unless none can be: the parts of
+/// a picture are made of the same samples, and so add up to the whole.
 fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
     let eye = world.camera.eye;
     let faces_eye = |l: &WorldLight| l.normal.dot(eye) > l.offset;
-    let seen = settings.light.emitted && world.lights.iter().any(faces_eye);
+    let seen = world.lights.iter().any(faces_eye);
     if access == Access::Tree {
         // The host looks at all surfaces for what mirrors show, which would take too long.
-        return u32::from(seen);
+        return u32::from(seen && settings.light.emitted);
     }
     let affordable = TRIPS_FOR_GLANCES
         / u64::from(GLANCES * GLANCES)
@@ -223,12 +227,17 @@ fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
         && !world.lights.is_empty()
         && world.primitives.len() + world.lights.len() <= BAKED_LIMIT;
     let wanted = if shown {
-        LONGEST_GLANCE.min(last_depth(settings))
+        LONGEST_GLANCE.min(settings.max_depth)
     } else {
         1
     };
     let sight = wanted.min(affordable as u32);
-    if sight > 1 || seen { sight } else { 0 }
+    let kept = (0..sight).any(|scatterings| settings.light.keeps(scatterings));
+    if kept && (sight > 1 || seen) {
+        sight
+    } else {
+        0
+    }
 }
 
 /// All that the path loop of a scene calls: constants, modules, and what is generated for the scene.
@@ -463,13 +472,14 @@ fn constants(world: &World, settings: &Settings) -> String {
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     constant("LIGHT_KEYS", "u32", format!("{}u", 4 * world.lights.len()));
     constant("GLANCES", "u32", format!("{GLANCES}u"));
-    let chain = if settings.light.indirect {
+    let chain = if settings.max_depth > 2 {
         CHAIN_GLANCES
     } else {
         GLANCES
     };
     constant("CHAIN_GLANCES", "u32", format!("{chain}u"));
     constant("BRANCH_SHIFT", "u32", format!("{BRANCH_SHIFT}u"));
+    constant("DIRECT_SHIFT", "u32", format!("{DIRECT_SHIFT}u"));
     constant("BLOCK", "u32", format!("{BLOCK}u"));
     constant("REPLICATES", "u32", format!("{REPLICATES}u"));
     constant("STRATA", "u32", format!("{}u", settings.strata));

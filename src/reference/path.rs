@@ -161,12 +161,7 @@ impl Tracer {
 
     /// Whether the picture keeps light that has been scattered `times` times.
     pub fn keeps(&self, times: u32) -> bool {
-        let parts = &self.settings.light;
-        match times {
-            0 => parts.emitted,
-            1 => parts.direct,
-            _ => parts.indirect,
-        }
+        self.settings.light.keeps(times)
     }
 
     /// Whether any light found beyond vertex `vertex` is kept.
