@@ -9,6 +9,7 @@ pub mod probe;
 mod same_hits;
 mod scene;
 mod seen;
+mod shown;
 mod tile;
 mod work;
 

@@ -212,10 +212,6 @@ fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
     let eye = world.camera.eye;
     let faces_eye = |l: &WorldLight| l.normal.dot(eye) > l.offset;
     let seen = world.lights.iter().any(faces_eye);
-    if access == Access::Tree {
-        // The host looks at all surfaces for what mirrors show, which would take too long.
-        return u32::from(seen && settings.light.emitted);
-    }
     let affordable = TRIPS_FOR_GLANCES
         / u64::from(GLANCES * GLANCES)
         / trips_at_vertex(world, settings, access, None);
@@ -226,12 +222,16 @@ fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
     let shown = specular.any(|b| matches!(b, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. }))
         && !world.lights.is_empty()
         && world.primitives.len() + world.lights.len() <= BAKED_LIMIT;
-    let wanted = if shown {
-        LONGEST_GLANCE.min(settings.max_depth)
-    } else {
+    let sight = if access == Access::Tree {
+        // The host looks at all surfaces for what mirrors show, which would take too long.
         1
+    } else if shown {
+        LONGEST_GLANCE
+            .min(settings.max_depth)
+            .min(affordable as u32)
+    } else {
+        affordable.min(1) as u32
     };
-    let sight = wanted.min(affordable as u32);
     let kept = (0..sight).any(|scatterings| settings.light.keeps(scatterings));
     if kept && (sight > 1 || seen) {
         sight

@@ -160,7 +160,7 @@ impl Tracer {
     }
 
     /// Whether the picture keeps light that has been scattered `times` times.
-    pub fn keeps(&self, times: u32) -> bool {
+    fn keeps(&self, times: u32) -> bool {
         self.settings.light.keeps(times)
     }
 
