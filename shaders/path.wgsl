@@ -87,19 +87,29 @@ struct Path {
 #endif
 }
 
-// A path but for its ray.
-fn begin(glances: u32) -> Path {
-    var path: Path;
-    path.beta = vec3f(1.0);
-    path.shown = 1.0;
-    path.radiance = vec3f(0.0);
-    path.depth = 1u;
-    path.specular = true;
-    path.clear = true;
+// Goes on with another path where one has `ended`: along this ray, with what glances have gathered. The rest is not asked for
+// before it is set.
+fn restart(path: ptr<function, Path>, ended: bool, ray: Ray, glances: u32, seen: vec3f) {
+    (*path).ray.o = select((*path).ray.o, ray.o, ended);
+    (*path).ray.d = select((*path).ray.d, ray.d, ended);
+    (*path).ray.face = select((*path).ray.face, ray.face, ended);
+    (*path).ray.medium = select((*path).ray.medium, ray.medium, ended);
+    (*path).beta = select((*path).beta, vec3f(1.0), ended);
+    (*path).shown = select((*path).shown, 1.0, ended);
+    (*path).radiance = select((*path).radiance, seen, ended);
+    (*path).depth = select((*path).depth, 1u, ended);
+    (*path).specular = (*path).specular || ended;
+    (*path).clear = (*path).clear || ended;
 #if SEEN_LIGHTS
-    path.glances = glances;
+    (*path).glances = select((*path).glances, glances, ended);
 #endif
-    return path;
+#if WHITTED
+    (*path).ending = (*path).ending && !ended;
+#endif
+#if IMAGES
+    (*path).memory = select((*path).memory, FREE, ended);
+    (*path).sends = (*path).sends && !ended;
+#endif
 }
 
 @compute @workgroup_size(64)
@@ -157,8 +167,8 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     let across = GLANCES;
     let glances = 0u;
 #endif
-    var path = begin(glances);
-    path.ray = camera_ray(pixel, film_position(key, s, params.seed, glances, across));
+    var path: Path;
+    restart(&path, true, camera_ray(pixel, film_position(key, s, params.seed, glances, across)), glances, vec3f(0.0));
     // The host keeps (end - first) x max_depth below the driver's limit on loop trips.
 #if TREE
     while s < end && going {
@@ -170,47 +180,45 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     // meets it: so that is done once every few turns.
     for (var turn = 0u; turn < TURNS && s < end && !path.sends; turn++) {
 #endif
-        var alive = false;
         let hit = intersect(path.ray);
         count.x += 1u;
 
+        // A light ends the path.
+        let meets_light = hit.key < LIGHT_KEYS;
+        var meets = !meets_light && hit.key != NONE;
 #if SEEN_LIGHTS
         let glance = path.glances > 0u;
         // What the glances have seen the path itself does not see again.
 #if GLANCES_GO_ON
         let blind = path.clear && path.depth <= sight && !glance;
+        meets = meets && (!glance || path.depth < sight);
 #else
         let blind = path.depth <= sight && !glance;
+        meets = meets && !glance;
 #endif
-        if hit.key < LIGHT_KEYS && !blind {
+        if meets_light && !blind {
             path.radiance += path.beta * emission(path, hit) * select(1.0, 1.0 / f32(across * across), glance);
         }
-#if GLANCES_GO_ON
-        let goes_on = !glance || path.depth < sight;
-        if goes_on && hit.key >= LIGHT_KEYS && hit.key != NONE {
-#else
-        if !glance && hit.key >= LIGHT_KEYS && hit.key != NONE {
-#endif
 #else
         let glance = false;
-        if hit.key < LIGHT_KEYS {
-            // A light ends the path.
+        if meets_light {
             path.radiance += path.beta * emission(path, hit);
-        } else if hit.key != NONE {
+        }
 #endif
 #if GLANCES_GO_ON
-            // Random numbers of its own for each glance.
-            let seed = params.seed ^ (path.glances * 0x9e3779b9u);
-            // Where the mark says so half of them are reflected: the black or the white fields of a chess board, by the toss
-            // of a coin for each sample.
-            let coin = hash_pixel(key, s, params.seed ^ 0x7f4a7c15u).x;
-            let field = (path.glances ^ ((path.glances - 1u) >> (across >> 1u)) ^ coin) & 1u;
-            path.way = select(BY_CHANCE, field, glance && path.depth == branch);
+        // Random numbers of its own for each glance.
+        let seed = params.seed ^ (path.glances * 0x9e3779b9u);
+        // Where the mark says so half of them are reflected: the black or the white fields of a chess board, by the toss
+        // of a coin for each sample.
+        let coin = hash_pixel(key, s, params.seed ^ 0x7f4a7c15u).x;
+        let field = (path.glances ^ ((path.glances - 1u) >> (across >> 1u)) ^ coin) & 1u;
+        path.way = select(BY_CHANCE, field, glance && path.depth == branch);
 #else
-            let seed = params.seed;
+        let seed = params.seed;
 #endif
-            alive = scatter_at(&path, hit, vec4u(key, s, path.depth, seed), &count);
-        }
+        // Some surface there is, whatever was met.
+        let met = Hit(hit.t, select(0u, hit.key, meets));
+        var alive = scatter_at(&path, meets, met, vec4u(key, s, path.depth, seed), &count);
 
 #if TREE
         // What the driver limits are the trips of lanes side by side, of which each knows only its own. Once they are used
@@ -226,46 +234,38 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
             alive = true;
         }
 #endif
-        if !alive {
-#if SEEN_LIGHTS
-            let more = select(glances, path.glances - 1u, glance);
-            let seen = select(vec3f(0.0), path.radiance, glance);
-#else
-            let more = 0u;
-#endif
-            if !glance {
-                // Add the sample, and start the next at once: no lane waits for a longer path.
-                let l = path.radiance;
-                let y = dot(l, vec3f(0.2126, 0.7152, 0.0722));
-                // WGSL may assume that there is no NaN: look at the bits.
-                let finite = (bitcast<u32>(y) & 0x7fffffffu) < 0x7f800000u;
-                let replicate = s / ROUND_SAMPLES % REPLICATES;
-                if finite {
-                    // The square serves the error of a single replicate alone; it must not overflow.
-                    let bounded = fmin(y, 1.0e15);
-                    let added = vec4f(l, bounded * bounded);
-                    sum_0 = select(sum_0, sum_0 + added, replicate == 0u);
-                    sum_1 = select(sum_1, sum_1 + added, replicate == 1u);
-                    sum_2 = select(sum_2, sum_2 + added, replicate == 2u);
-                    sum_3 = select(sum_3, sum_3 + added, replicate == 3u);
-                } else {
-                    let at = s % BLOCK + 1u;
-                    count.y |= select(0u, at << 16u, count.y < 0x10000u);
-                    let one = 1u << (16u * (replicate % 2u));
-                    count.z += select(0u, one, replicate < 2u);
-                    count.w += select(one, 0u, replicate < 2u);
-                }
-                s += 1u;
+        // Add the sample of a path that has ended, and start the next at once: no lane waits for a longer path.
+        let done = !alive && !glance;
+        let l = path.radiance;
+        let y = dot(l, vec3f(0.2126, 0.7152, 0.0722));
+        // WGSL may assume that there is no NaN: look at the bits.
+        let finite = (bitcast<u32>(y) & 0x7fffffffu) < 0x7f800000u;
+        let replicate = s / ROUND_SAMPLES % REPLICATES;
+        // The square serves the error of a single replicate alone; it must not overflow.
+        let bounded = fmin(y, 1.0e15);
+        let added = vec4f(l, bounded * bounded);
+        let adds = done && finite;
+        sum_0 = select(sum_0, sum_0 + added, adds && replicate == 0u);
+        sum_1 = select(sum_1, sum_1 + added, adds && replicate == 1u);
+        sum_2 = select(sum_2, sum_2 + added, adds && replicate == 2u);
+        sum_3 = select(sum_3, sum_3 + added, adds && replicate == 3u);
+        let lacks = done && !finite;
+        count.y |= select(0u, (s % BLOCK + 1u) << 16u, lacks && count.y < 0x10000u);
+        let one = 1u << (16u * (replicate % 2u));
+        count.z += select(0u, one, lacks && replicate < 2u);
+        count.w += select(0u, one, lacks && replicate >= 2u);
+        s += select(0u, 1u, done);
 #if TREE
-                before = count;
+        before = select(before, count, done);
 #endif
-            }
-            path = begin(more);
 #if SEEN_LIGHTS
-            path.radiance = seen;
+        let more = select(glances, path.glances - 1u, glance);
+        let seen = select(vec3f(0.0), path.radiance, glance);
+#else
+        let more = 0u;
+        let seen = vec3f(0.0);
 #endif
-            path.ray = camera_ray(pixel, film_position(key, s, params.seed, more, across));
-        }
+        restart(&path, !alive, camera_ray(pixel, film_position(key, s, params.seed, more, across)), more, seen);
 #if IMAGES
     } // Turns; their lines stand as in kernels without this loop.
     if path.sends {

@@ -53,3 +53,27 @@ fn phong_value(kd: vec3f, ks: vec3f, exponent: f32, cos: f32, power: f32) -> Pho
     let pdf = (1.0 - choice) * cos * 0.31830989 + choice * (exponent + 1.0) * lobe;
     return PhongValue(f * cos, pdf);
 }
+
+struct PhongSample {
+    d: vec3f,
+    // f times the cosine over the density.
+    weight: vec3f,
+    // Density of the mixture of both lobes, per solid angle.
+    pdf: f32,
+}
+
+// A direction about normal n, of one of the lobes; r is where it mirrors the eye.
+fn sample_phong(kd: vec3f, ks: vec3f, exponent: f32, n: vec3f, r: vec3f, choice: f32, u: vec2f) -> PhongSample {
+    let probability = lobe_probability(kd, ks);
+    let from_lobe = choice < probability;
+    let lobe = sample_lobe(r, exponent, u);
+    let d = select(sample_cosine(n, u), lobe.d, from_lobe);
+    let power = select(phong_power(d, r, exponent), lobe.power, from_lobe);
+    let cos = dot(n, d);
+    let value = phong_value(kd, ks, exponent, cos, power);
+    let quotient = value.f_cos * (1.0 / fmax(value.pdf, TINY));
+    // Where there is no diffuse part the powers cancel, and nothing is left to divide.
+    let pure = ks * ((exponent + 2.0) / (exponent + 1.0) * cos);
+    // Below the horizon the sample counts as zero and is not drawn again.
+    return PhongSample(d, select(vec3f(0.0), select(quotient, pure, probability >= 1.0), cos > 0.0), value.pdf);
+}

@@ -81,21 +81,19 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
     let n = select(across * inverseSqrt(fmax(distance2, TINY_SQUARE)), -ray.d, distance2 < TINY_SQUARE);
     let round = Vertex(s.point + along + s.radius * n, n);
 #if FLAT
-    if s.shape >= SHAPE_CYLINDER && part == 0u {
-        v = round;
-    }
+    let curved = s.shape >= SHAPE_CYLINDER && part == 0u;
+    v = Vertex(select(v.p, round.p, curved), select(v.n, round.n, curved));
 #else
     var v = round;
 #endif
 #endif
 #if HUGE
-    if s.shape == SHAPE_HUGE_SPHERE {
-        // axis: the normal at the pole; offset: the curvature. Down along the normal by the height.
-        let w = p - s.point;
-        let normal = normalize(s.axis + s.offset * w);
-        let height = 0.5 * s.offset * dot(w, w) + dot(s.axis, w);
-        v = Vertex(p - normal * height, normal);
-    }
+    // axis: the normal at the pole; offset: the curvature. Down along the normal by the height.
+    let w = p - s.point;
+    let normal = normalize(s.axis + s.offset * w);
+    let height = 0.5 * s.offset * dot(w, w) + dot(s.axis, w);
+    let huge = s.shape == SHAPE_HUGE_SPHERE;
+    v = Vertex(select(v.p, p - normal * height, huge), select(v.n, normal, huge));
 #endif
     return v;
 }
