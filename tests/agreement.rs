@@ -136,8 +136,8 @@ fn faults_are_seen(s: &Scene) -> Result<(), Failed> {
         ),
         // What glass reflects and what it lets through, as if each were half of the light.
         (
-            "weight *= select(share, 1.0, (*path).way == BY_CHANCE);",
-            "",
+            "material.color, crosses) * share, glass);",
+            "material.color, crosses), glass);",
         ),
     ] {
         let runs = (0..RUNS).map(|k| {
