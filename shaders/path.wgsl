@@ -25,9 +25,9 @@ struct Params {
 // Running sums of the block, a layer for each replicate: R, G, B, squared luminance.
 @group(1) @binding(1) var running_in: texture_2d_array<f32>;
 @group(1) @binding(2) var running_out: texture_storage_2d_array<rgba32float, write>;
-// For each pixel of the tile: rays; truncated paths, and in the upper half 1 + the place in its block of the first sample
+// For each pixel of the tile, four words: rays; truncated paths, and in the upper half 1 + the place in its block of the first sample
 // that was not finite; how many of those replicates 0 and 1 had, in a half each; and replicates 2 and 3.
-@group(1) @binding(3) var<storage, read_write> counters: array<vec4u>;
+@group(1) @binding(3) var<storage, read_write> counters: array<u32>;
 
 // What is left to do.
 struct Left {
@@ -132,8 +132,26 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var sum_1 = vec4f(0.0);
     var sum_2 = vec4f(0.0);
     var sum_3 = vec4f(0.0);
-    let first = left.next[index];
-    let wanted = left.next[params.pixels + index];
+    // Of every kind of access one, in a loop of which no compiler knows how often it goes round. A software adapter makes code
+    // for each lane and word of each, and compiling it took a third of the time for three_materials on Mesa 25.
+    var first = 0u;
+    var wanted = 0u;
+    var mark = 0u;
+#if SEEN_LIGHTS
+    let words = params.rounds + 1u;
+#else
+    let words = params.rounds;
+#endif
+    for (var k = 0u; k < words; k++) {
+        let word = left.next[k * params.pixels + index];
+        first = select(first, word, k == 0u);
+        wanted = select(wanted, word, k == 1u);
+        mark = select(mark, word, k == 2u);
+    }
+    var count = vec4u(0u);
+    for (var k = 0u; k < 2u * params.rounds; k++) {
+        count = select(count, vec4u(counters[4u * index + k]), vec4u(0u, 1u, 2u, 3u) == vec4u(k));
+    }
     let end = first + min(wanted - first, params.most);
     // A block's sums start at zero. Those of a pixel without samples go from one texture to the other.
     if first % BLOCK != 0u || first == end {
@@ -142,7 +160,6 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         sum_2 = textureLoad(running_in, texel, 2, 0);
         sum_3 = textureLoad(running_in, texel, 3, 0);
     }
-    var count = counters[index];
 
     var s = first;
 #if TREE
@@ -152,7 +169,6 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var going = true;
 #endif
 #if SEEN_LIGHTS
-    let mark = left.next[2u * params.pixels + index];
 #if GLANCES_GO_ON
     // And at which vertex one half of them goes into glass and the other is reflected; 0: that is left to chance everywhere.
     let branch = (mark >> BRANCH_SHIFT) & 0xffu;
@@ -281,9 +297,21 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         atomicMax(&left.stuck, select(0u, index + 1u, s == first));
     }
 #endif
+#if TREE
+    // Loops may go round no more here.
     textureStore(running_out, texel, 0, sum_0);
     textureStore(running_out, texel, 1, sum_1);
     textureStore(running_out, texel, 2, sum_2);
     textureStore(running_out, texel, 3, sum_3);
-    counters[index] = count;
+    counters[4u * index] = count.x;
+    counters[4u * index + 1u] = count.y;
+    counters[4u * index + 2u] = count.z;
+    counters[4u * index + 3u] = count.w;
+#else
+    for (var k = 0u; k < 2u * params.rounds; k++) {
+        let sum = select(select(sum_0, sum_1, k == 1u), select(sum_2, sum_3, k == 3u), k >= 2u);
+        textureStore(running_out, texel, k, sum);
+        counters[4u * index + k] = select(select(count.x, count.y, k == 1u), select(count.z, count.w, k == 3u), k >= 2u);
+    }
+#endif
 }

@@ -78,7 +78,7 @@ pub struct Params {
     pub stride: u32,
     /// Loop trips that an invocation may take.
     pub trips: u32,
-    /// 2: rounds of a loop that tells whether the driver still lets loops go round.
+    /// 2, for loops that no compiler unrolls: over words of a pixel, and one that tells whether the driver still lets loops go round.
     pub rounds: u32,
 }
 

@@ -153,7 +153,7 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
             let turns = u64::from(last_depth(settings)) + u64::from(GLANCES * GLANCES * sight);
             let trips = turns
                 .saturating_mul(trips_at_vertex(world, settings, access, None))
-                .saturating_add(STRATA_LOOP);
+                .saturating_add(STRATA_LOOP + LOOPS_AROUND);
             // The loop over turns is in one of its own then, which goes round no more often.
             trips
                 + if features.contains("IMAGES") {
@@ -206,6 +206,9 @@ fn trips_at_vertex(
 /// The loop trips that the choice of a place in the pixel can take.
 const STRATA_LOOP: u64 = 32;
 
+/// Those that reading and writing a pixel's numbers take, before its first sample and after its last: three, four and four.
+const LOOPS_AROUND: u64 = 11;
+
 /// The last vertex at which glances look for lights; 0: there are none. Not by which light is kept, unless none can be: the parts of
 /// a picture are made of the same samples, and so add up to the whole.
 fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
@@ -254,7 +257,7 @@ fn scene_text(
     if let Some(parted) = &parted {
         let vertex = trips_at_vertex(world, settings, access, Some(parted));
         let glances = u64::from(GLANCES * GLANCES * sight(world, settings, access));
-        let start = glances + STRATA_LOOP;
+        let start = glances + STRATA_LOOP + LOOPS_AROUND;
         let _ = writeln!(
             s,
             "const TRIPS_AT_VERTEX: u32 = {vertex}u;\nconst TRIPS_AT_START: u32 = {start}u;"
