@@ -74,7 +74,7 @@ const BY_CHANCE: u32 = 2u;
 // Scatters a path that `meets` a surface: direct light, then a new direction. False when it ends there, or met none.
 //
 // Nearly without branches. A software adapter goes through every branch for all its lanes, and what a branch sets in a loop is
-// alive all the way round it: selections made three_materials faster by 10 %, and its kernel ready in four fifths of the time.
+// alive all the way round it: selections made three_materials 1.08 to 1.1 times as fast, and compiled in 0.8 of the time.
 fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u, count: ptr<function, vec4u>) -> bool {
     let surface = surface_at(hit.key);
     let material = material_at(surface.material);
@@ -187,11 +187,11 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
         let power = phong_power(to.d, mirrored(d, n), material.exponent);
         let value = phong_value(material.color, material.specular, material.exponent, cos, power);
 #if MIS
-        let glossy = value.f_cos * power_heuristic(inverse_pdf * (1.0 / DENSER), value.pdf);
+        let lobes = value.f_cos * power_heuristic(inverse_pdf * (1.0 / DENSER), value.pdf);
 #else
-        let glossy = value.f_cos;
+        let lobes = value.f_cos;
 #endif
-        f_cos = select(f_cos, glossy, phong);
+        f_cos = select(f_cos, lobes, phong);
 #endif
         let asks = scatters && !ends && cos > 0.0 && inverse_pdf > 0.0 && kept((*path).depth);
         (*count).x += select(0u, 1u, asks);
@@ -246,11 +246,12 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
 #endif
 #endif
 #if PHONG
-    let glossy_sample = sample_phong(material.color, material.specular, material.exponent, n, mirrored(d, n), u.choices.y, u.points.zw);
-    next = select(next, glossy_sample.d, phong);
-    weight = select(weight, glossy_sample.weight, phong);
+    let r = mirrored(d, n);
+    let glossy = sample_phong(material.color, material.specular, material.exponent, n, r, u.choices.y, u.points.zw);
+    next = select(next, glossy.d, phong);
+    weight = select(weight, glossy.weight, phong);
 #if MIS
-    pdf = select(pdf, glossy_sample.pdf, phong);
+    pdf = select(pdf, glossy.pdf, phong);
 #endif
 #endif
 #if MIRROR
