@@ -25,8 +25,8 @@ struct Params {
 // Running sums of the block, a layer for each replicate: R, G, B, squared luminance.
 @group(1) @binding(1) var running_in: texture_2d_array<f32>;
 @group(1) @binding(2) var running_out: texture_storage_2d_array<rgba32float, write>;
-// For each pixel of the tile, four words: rays; truncated paths, and in the upper half 1 + the place in its block of the first sample
-// that was not finite; how many of those replicates 0 and 1 had, in a half each; and replicates 2 and 3.
+// For each pixel of the tile, four words: rays; truncated paths, and in the upper half 1 + the place in its block of the first
+// sample that was not finite; how many of those replicates 0 and 1 had, in a half each; and replicates 2 and 3.
 @group(1) @binding(3) var<storage, read_write> counters: array<u32>;
 
 // What is left to do.
