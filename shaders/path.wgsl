@@ -234,7 +234,14 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 #endif
         // Some surface there is, whatever was met.
         let met = Hit(hit.t, select(0u, hit.key, meets));
-        var alive = scatter_at(&path, meets, met, vec4u(key, s, path.depth, seed), &count);
+        var alive = false;
+#if BRANCHES
+        if meets {
+#endif
+        alive = scatter_at(&path, meets, met, vec4u(key, s, path.depth, seed), &count);
+#if BRANCHES
+        }
+#endif
 
 #if TREE
         // What the driver limits are the trips of lanes side by side, of which each knows only its own. Once they are used

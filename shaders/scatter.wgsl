@@ -75,6 +75,7 @@ const BY_CHANCE: u32 = 2u;
 //
 // Nearly without branches. A software adapter goes through every branch for all its lanes, and what a branch sets in a loop is
 // alive all the way round it: selections made three_materials 1.08 to 1.1 times as fast, and compiled in 0.8 of the time.
+// Where values are not baked in, the adapter may be one whose compiler takes minutes over so long a block: SwiftShader's.
 fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u, count: ptr<function, vec4u>) -> bool {
     let surface = surface_at(hit.key);
     let material = material_at(surface.material);
@@ -148,6 +149,9 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
     let scatters = material.kind == MATERIAL_DIFFUSE || material.kind == MATERIAL_PHONG;
     var weights = 0.0;
     var gathered = vec3f(0.0);
+#if BRANCHES
+    if scatters && !ends {
+#endif
 #if SEVERAL_SHADOW_RAYS
     for (var k = 0u; k < u32(SHADOW_RAYS); k++) {
         let more = draw(draw_key + vec4u(0u, 0u, k << 20u, 0u));
@@ -206,6 +210,9 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
 #if SEVERAL_SHADOW_RAYS
     }
 #endif
+#if BRANCHES
+    }
+#endif
 #if LIGHT_SCALES
     gathered *= light_scale((*path).ray.medium);
 #endif
@@ -227,6 +234,9 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
     var memory = FREE;
 #endif
 #if DIFFUSE
+#if BRANCHES
+    if diffuse {
+#endif
     let around = sample_cosine(n, u.points.zw);
     next = select(next, around, diffuse);
     weight = select(weight, material.color, diffuse);
@@ -244,8 +254,14 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
     (*path).sends = taken;
     (*path).normal = n;
 #endif
+#if BRANCHES
+    }
+#endif
 #endif
 #if PHONG
+#if BRANCHES
+    if phong {
+#endif
     let r = mirrored(d, n);
     let glossy = sample_phong(material.color, material.specular, material.exponent, n, r, u.choices.y, u.points.zw);
     next = select(next, glossy.d, phong);
@@ -253,8 +269,14 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
 #if MIS
     pdf = select(pdf, glossy.pdf, phong);
 #endif
+#if BRANCHES
+    }
+#endif
 #endif
 #if MIRROR
+#if BRANCHES
+    if mirror {
+#endif
     next = select(next, mirrored(d, n), mirror);
     weight = select(weight, material.color, mirror);
     specular = specular || mirror;
@@ -262,8 +284,14 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
     memory = select(memory, after_mirror((*path).memory, hit.key >> 2u, cos_i), mirror);
     ends = ends || (mirror && memory == ASTRAY);
 #endif
+#if BRANCHES
+    }
+#endif
 #endif
 #if DIELECTRIC
+#if BRANCHES
+    if glass {
+#endif
     let eta = select(1.0 / material.exponent, material.exponent, outside);
     let fresnel = refraction(cos_i, eta);
     var crosses = u.choices.y < fresnel.transmitted;
@@ -279,6 +307,9 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
     weight = select(weight, select(vec3f(1.0), material.color, crosses) * share, glass);
     medium = select(medium, select(surface.parent, surface.solid, outside), glass && crosses);
     specular = specular || glass;
+#if BRANCHES
+    }
+#endif
 #endif
 
     let beta = (*path).beta * weight;
