@@ -303,8 +303,6 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         atomicAdd(&left.unfinished, 1u);
         atomicMax(&left.stuck, select(0u, index + 1u, s == first));
     }
-#endif
-#if TREE
     // Loops may go round no more here.
     textureStore(running_out, texel, 0, sum_0);
     textureStore(running_out, texel, 1, sum_1);

@@ -216,7 +216,8 @@ fn scatter_at(path: ptr<function, Path>, meets: bool, hit: Hit, draw_key: vec4u,
 #if LIGHT_SCALES
     gathered *= light_scale((*path).ray.medium);
 #endif
-    (*path).radiance += (*path).beta * gathered;
+    // Not even zero where nothing is asked: the path's weight may have left f32.
+    (*path).radiance += select(vec3f(0.0), (*path).beta * gathered, scatters && !ends);
 #if WHITTED
     (*path).ending = (*path).ending || scatters;
 #endif

@@ -400,7 +400,7 @@ fn features(world: &World, settings: &Settings, access: Access) -> BTreeSet<&'st
     let sampling = depth > 1 && !world.lights.is_empty() && (diffuse || phong);
     set("LIGHT_SAMPLING", sampling);
     set("TREE", access == Access::Tree);
-    set("BRANCHES", access == Access::Buffers);
+    set("BRANCHES", access != Access::Baked);
     set(
         "LIGHT_TREE",
         sampling && access == Access::Tree && records::clustered(world),
