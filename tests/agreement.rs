@@ -131,13 +131,13 @@ fn faults_are_seen(s: &Scene) -> Result<(), Failed> {
     for (right, wrong) in [
         // The path sees again what extra camera rays have seen in a mirror.
         (
-            "let blind = path.clear && path.depth <= sight",
-            "let blind = path.depth <= min(sight, 1u)",
+            "!path.all_specular || path.depth > sight.depth",
+            "path.depth > min(sight.depth, 1u)",
         ),
         // What glass reflects and what it lets through, as if each were half of the light.
         (
-            "material.color, crosses) * share, glass);",
-            "material.color, crosses), glass);",
+            "material.color, crosses) * share;",
+            "material.color, crosses);",
         ),
     ] {
         let runs = (0..RUNS).map(|k| {

@@ -22,11 +22,11 @@ mod common;
 use common::{block_means, cpu, film, scene, settings, worst_t};
 use etendue::gpu::probe::{Probe, UNWRITTEN, Uniform, Values};
 use etendue::gpu::{Choice, Gpu, GpuEngine};
-use etendue::kernel::{Access, MOST_LOOKED_AT, scene_probe_source};
+use etendue::kernel::{Access, scene_probe_source};
 use etendue::reference::Estimator;
 use etendue::scene::Scene;
 use etendue::settings::{LightParts, Settings};
-use etendue::world::{Geometry, World};
+use etendue::world::{Geometry, MOST_LOOKED_AT, World};
 use glam::DVec3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
@@ -282,7 +282,7 @@ fn no_light_is_lost() {
         &gpu,
         &world,
         &settings,
-        "y[0] = light_probability(u32(x[6]), p, at);",
+        "y[0] = light_probability(u32(x[6]), light_at(u32(x[6])), p, at, 0.0);",
         &inputs,
     );
     let mut sending = 0;
@@ -325,8 +325,8 @@ fn lights_are_chosen_as_often_as_said() {
     let body = "
         let chosen = choose_light(p, at, vec2f(x[7], x[8]));
         y[0] = select(f32(chosen.index), -1.0, chosen.inverse_probability == 0.0);
-        y[1] = chosen.inverse_probability * light_probability(chosen.index, p, at);
-        y[2] = light_probability(u32(x[6]), p, at);";
+        y[1] = chosen.inverse_probability * light_probability(chosen.index, chosen.light, p, at, chosen.weights);
+        y[2] = light_probability(u32(x[6]), light_at(u32(x[6])), p, at, 0.0);";
     let out = probe(&gpu, &world, &settings, body, &inputs);
     // By light, and last of all nothing: how often it was chosen, and was to be, and the variance of that.
     let mut counts = vec![[0.0; 3]; lights + 1];

@@ -150,7 +150,7 @@ fn light_counted_twice_is_seen() {
 #[test]
 fn a_density_wrong_by_a_fifth_is_seen() {
     let p = p(&kernel(Access::Baked, |k| {
-        replace(k, "3.14159265 * radius * radius", "3.77 * radius * radius");
+        replace(k, "PI * radius * radius", "3.77 * radius * radius");
     }));
     assert!(p < FALSE_ALARM, "p = {p}");
 }

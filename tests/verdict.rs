@@ -192,8 +192,8 @@ fn faults(size: f64) -> Vec<Fault> {
             scene: "diffuse",
             text: None,
             kernel: Some((
-                "Ray(v.p, to.d, face",
-                format!("Ray(v.p + {out} * n, to.d, face"),
+                "Ray(x.p, wi.d, x.face",
+                format!("Ray(x.p + {out} * x.n, wi.d, x.face"),
             )),
         },
         Fault {

@@ -2,6 +2,7 @@
 
 use super::GpuError;
 use crate::engine::DeviceInfo;
+use crate::kernel::trips;
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// Which adapter is wanted.
@@ -151,7 +152,7 @@ impl Gpu {
                 keep(&slot, format!("the device was lost: {message}"));
             }
         });
-        let trip_limit = trip_limit(&info);
+        let trip_limit = trips::limit(&info.name, &info.driver);
         Self {
             device,
             queue,
@@ -205,21 +206,4 @@ fn open_device(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), S
         ..Default::default()
     }))
     .map_err(|e| format!("it gives no device: {e}"))
-}
-
-/// Older llvmpipe ends every loop of an invocation silently once its loops have made 65535 trips together
-/// (seen with Mesa 22.3, not with 25.0); what has no number is taken for old.
-fn trip_limit(info: &DeviceInfo) -> u64 {
-    let llvmpipe = info.name.to_lowercase().contains("llvmpipe");
-    let mesa = info
-        .driver
-        .split("Mesa ")
-        .nth(1)
-        .and_then(|v| v.split('.').next())
-        .and_then(|v| v.parse::<u32>().ok());
-    if llvmpipe && mesa.is_none_or(|v| v < 25) {
-        65_000
-    } else {
-        u64::from(u32::MAX)
-    }
 }

@@ -10,6 +10,7 @@ use crate::engine::{EngineError, Part};
 use crate::film::coverage::Rect;
 use crate::film::pilot::Pilot;
 use crate::film::{BLOCK, Film, REPLICATES};
+use crate::kernel::pilot_seed;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
@@ -22,9 +23,6 @@ const FIRST_PILOT: u64 = 8;
 /// Each pilot lasts until the mean has grown by this factor; together they then double. Rarely, for four samples a pixel
 /// are many in a tile: sixteen steer no more than 1 % better on any scene measured, and would cost 5 %.
 const PILOT_LASTS: u64 = 16;
-
-/// What makes a pilot's seed differ from the picture's.
-const PILOT_SEED: u32 = 0x9e37_79b9;
 
 /// See [`EVEN`]; whole rounds of all replicates.
 fn even(round: u64) -> u64 {
@@ -181,7 +179,7 @@ impl Run<'_> {
 
     /// Renders a pilot, in pieces that are forgotten once they are measured; false when it was stopped.
     fn make_pilot(&mut self, stage: usize, seed: u32) -> Result<bool, EngineError> {
-        self.engine.reseed(seed ^ PILOT_SEED);
+        self.engine.reseed(pilot_seed(seed));
         let done = self.measure(pilot_samples(stage, self.job.round));
         self.engine.reseed(seed);
         done

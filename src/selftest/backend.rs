@@ -7,7 +7,7 @@ use crate::film::coverage::Rect;
 use crate::film::{BLOCK, Film};
 use crate::gpu::probe::{self, Probe, UNWRITTEN, Values};
 use crate::gpu::{Gpu, GpuEngine, GpuError};
-use crate::kernel::Access;
+use crate::kernel::{Access, ProbeFeatures};
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
 use crate::stats::luminance;
@@ -180,10 +180,10 @@ impl Backend {
     }
 
     /// A function of numbers: on an adapter the WGSL statements `body`, which read `x` and write `y`, beside the shader
-    /// modules under `features`; on the reference `twin`. What `inputs` an adapter gets are rounded to f32 first.
+    /// modules; on the reference `twin`. What `inputs` an adapter gets are rounded to f32 first.
     pub(super) fn evaluate(
         &self,
-        (features, body): (&[&'static str], &str),
+        body: &str,
         twin: impl Fn(&Numbers) -> Numbers,
         inputs: &[Numbers],
     ) -> Result<Vec<Numbers>, Trouble> {
@@ -191,7 +191,8 @@ impl Backend {
             return Ok(inputs.iter().map(twin).collect());
         };
         let rounded: Vec<Values> = inputs.iter().map(|x| x.map(|x| x as f32)).collect();
-        let out = probe::run(&open.gpu, features, body, &rounded).map_err(Trouble::Device)?;
+        let out = probe::run(&open.gpu, &ProbeFeatures::default(), body, &rounded)
+            .map_err(Trouble::Device)?;
         written(&out)
     }
 

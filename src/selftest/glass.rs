@@ -113,7 +113,7 @@ fn fresnel(b: &Backend, inputs: &[Numbers]) -> Result<Vec<f64>, Trouble> {
         y
     };
     let body = "y[0] = refraction(x[0], x[1]).transmitted;";
-    let out = b.evaluate((&["DIELECTRIC"], body), twin, inputs)?;
+    let out = b.evaluate(body, twin, inputs)?;
     Ok(out.iter().map(|y| y[0]).collect())
 }
 

@@ -99,7 +99,7 @@ fn samples(b: &Backend, points: &[[f64; 2]], [a, h, r]: [f64; 3]) -> Result<Vec<
         }
         y
     };
-    b.evaluate((&["LIGHT_SAMPLING"], LIGHT), twin, &inputs)
+    b.evaluate(LIGHT, twin, &inputs)
 }
 
 /// An even spread of points in the unit square (Hammersley).

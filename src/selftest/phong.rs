@@ -94,7 +94,7 @@ fn grazing(b: &Backend, n: f64) -> Result<Measure, Trouble> {
         y[0] = sample.map_or(0.0, |(_, weight, _)| weight.x);
         y
     };
-    let out = b.evaluate((&["PHONG", "DIFFUSE"], body), twin, &inputs)?;
+    let out = b.evaluate(body, twin, &inputs)?;
     let mean = out.iter().map(|y| y[0]).sum::<f64>() / out.len() as f64;
     let ratio = (ln_gamma((n + 1.0) / 2.0) - ln_gamma(n / 2.0 + 2.0)).exp();
     let expected = (n + 2.0) / (4.0 * PI.sqrt()) * ratio;
@@ -167,7 +167,7 @@ fn reciprocity(b: &Backend) -> Result<Vec<Measure>, Trouble> {
                 inputs.push(x);
             }
         }
-        let out = b.evaluate((&["PHONG", "MIRROR", "DIFFUSE"], body), twin, &inputs)?;
+        let out = b.evaluate(body, twin, &inputs)?;
         let asymmetry = |y: &Numbers| (y[0] - y[1]).abs() / y[0].max(y[1]);
         // A maximum would pass over what is not a number.
         let worst =

@@ -15,8 +15,8 @@ const LEAF: u32 = 0xffffffffu;
 // Farther than anything.
 const MISSED: f32 = 1.0e38;
 
-// What is left of the loop trips that the driver grants an invocation. When none are left the walk is no use, and the
-// sample is begun again by the next dispatch.
+// Loop trips left to the invocation: see trips/counted.wgsl. When none are left the walk is no use, and the sample begins again in the
+// next dispatch.
 var<private> trips_left: u32 = 0xffffffffu;
 
 // A ray made ready for boxes.
@@ -66,4 +66,15 @@ fn onward(at: Place, entry_0: f32, entry_1: f32) -> Place {
     let siblings = select((at.siblings >> levels) ^ 1u, 2u * at.siblings + u32(both), met);
     let over = !met && at.siblings == 0u;
     return Place(select(node, 0u, over), select(siblings, 0u, over));
+}
+
+// The nearer of two hits. Trees are walked in any order: of equals the one with the lower key comes first in the scene.
+fn keep_nearest(hit: Hit, found: Hit, item: u32) -> Hit {
+    let take = found.t < hit.t || (found.t == hit.t && found.key < hit.key);
+    return Hit(select(hit.t, found.t, take), select(hit.key, found.key, take));
+}
+
+// What a shadow ray has met, if the surface of `item` can block light at all.
+fn keep_blocker(hit: Hit, found: Hit, item: u32) -> Hit {
+    return Hit(hit.t, select(hit.key, found.key, (item & 1u) == 1u));
 }

@@ -41,9 +41,7 @@ fn cluster_importance(c: LightCluster, p: vec3f, at: Receiver) -> f32 {
     let dark = power == 0.0 || (far && (cosines.x < -0.002 || cosines.y < -0.002));
     let both = clamp(cosines, vec2f(0.01), vec2f(1.0));
     var weight = power * select(1.0, both.x * both.y, far) * inverse * inverse;
-#if GLOSSY
     weight *= scattered(at, -v, inverse, c.radius);
-#endif
     return select(max(weight, TINY), 0.0, dark);
 }
 
@@ -111,7 +109,7 @@ fn choose_light(p: vec3f, at: Receiver, u: vec2f) -> Chosen {
 }
 
 // The probability with which choose_light takes a light.
-fn light_probability(index: u32, p: vec3f, at: Receiver) -> f32 {
+fn light_probability(index: u32, light: DiskLight, p: vec3f, at: Receiver, weights: f32) -> f32 {
     let places = record(PLACE_RECORDS + index / 4u);
     let place = select(
         select(places.x, places.y, index % 4u == 1u),
@@ -125,7 +123,7 @@ fn light_probability(index: u32, p: vec3f, at: Receiver) -> f32 {
         let second = (cluster >> (level - 1u)) & 1u;
         probability *= select(share, 1.0 - share, second == 1u);
     }
-    let weights = weights_of(lights_of(cluster), p, at);
-    let sum = weights.x + weights.y + weights.z + weights.w;
+    let four = weights_of(lights_of(cluster), p, at);
+    let sum = four.x + four.y + four.z + four.w;
     return probability * weight_of(index, p, at) / max(sum, TINY);
 }

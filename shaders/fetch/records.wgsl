@@ -1,7 +1,7 @@
 // What a large scene consists of, in one storage texture. Where each lane has an index of its own, lavapipe loads from a
 // buffer word by word, and from a sampled texture with a level of detail for each lane: ten and three times as slow.
 
-@group(0) @binding(3) var records: texture_storage_2d<rgba32uint, read>;
+@group(0) @binding(0) var records: texture_storage_2d<rgba32uint, read>;
 
 fn record(i: u32) -> vec4u {
     return textureLoad(records, vec2u(i % RECORDS_A_ROW, i / RECORDS_A_ROW));

@@ -1,14 +1,14 @@
 //! Whether light sampling alone is enough for diffuse surfaces.
 
+use super::{Geometry, World, WorldLight, WorldPrimitive};
 use crate::scene::Bsdf;
-use crate::world::{Geometry, World, WorldLight, WorldPrimitive};
 
 /// Whether a diffuse surface comes nearer to the front of a light than the light's radius. There the cosine, which cap
 /// sampling leaves out, varies so much over the light that bounces which meet it by chance are worth weighing in: on
 /// such scenes that lowers the variance by 1.3 to 2.5, on others by nothing, and it costs 5 to 9 % of the time.
 ///
 /// Among so many things and lights that the pairs are too many to look at it is taken to be so.
-pub(super) fn light_near_diffuse(world: &World) -> bool {
+pub(crate) fn light_near_diffuse(world: &World) -> bool {
     const PAIRS: usize = 10_000_000;
     if world.primitives.len() * world.lights.len() > PAIRS {
         return true;

@@ -48,9 +48,9 @@ struct PhongValue {
 // For a direction at cosine `cos` > 0 to the normal whose cos^n(alpha) is `power`.
 fn phong_value(kd: vec3f, ks: vec3f, exponent: f32, cos: f32, power: f32) -> PhongValue {
     let choice = lobe_probability(kd, ks);
-    let lobe = power * 0.15915494;
-    let f = kd * 0.31830989 + ks * ((exponent + 2.0) * lobe);
-    let pdf = (1.0 - choice) * cos * 0.31830989 + choice * (exponent + 1.0) * lobe;
+    let lobe = power * INV_2PI;
+    let f = kd * INV_PI + ks * ((exponent + 2.0) * lobe);
+    let pdf = (1.0 - choice) * cos * INV_PI + choice * (exponent + 1.0) * lobe;
     return PhongValue(f * cos, pdf);
 }
 
@@ -63,7 +63,7 @@ struct PhongSample {
 }
 
 // A direction about normal n, of one of the lobes; r is where it mirrors the eye.
-fn sample_phong(kd: vec3f, ks: vec3f, exponent: f32, n: vec3f, r: vec3f, choice: f32, u: vec2f) -> PhongSample {
+fn sample_lobes(kd: vec3f, ks: vec3f, exponent: f32, n: vec3f, r: vec3f, choice: f32, u: vec2f) -> PhongSample {
     let probability = lobe_probability(kd, ks);
     let from_lobe = choice < probability;
     let lobe = sample_lobe(r, exponent, u);
@@ -76,4 +76,17 @@ fn sample_phong(kd: vec3f, ks: vec3f, exponent: f32, n: vec3f, r: vec3f, choice:
     let pure = ks * ((exponent + 2.0) / (exponent + 1.0) * cos);
     // Below the horizon the sample counts as zero and is not drawn again.
     return PhongSample(d, select(vec3f(0.0), select(quotient, pure, probability >= 1.0), cos > 0.0), value.pdf);
+}
+
+fn sample_phong(x: Interaction, u: Draws) -> Scattered {
+    let m = x.material;
+    let s = sample_lobes(m.color, m.specular, m.exponent, x.n, mirrored(-x.wo, x.n), u.lobe, u.direction);
+    return Scattered(s.d, s.weight, s.pdf, false, x.medium);
+}
+
+fn evaluate_phong(x: Interaction, wi: vec3f) -> BsdfValue {
+    let m = x.material;
+    let power = phong_power(wi, mirrored(-x.wo, x.n), m.exponent);
+    let value = phong_value(m.color, m.specular, m.exponent, dot(x.n, wi), power);
+    return BsdfValue(value.f_cos, value.pdf);
 }

@@ -25,3 +25,18 @@ fn refracted(d: vec3f, n: vec3f, cos_i: f32, cos_t: f32, eta: f32) -> vec3f {
     let inv_eta = 1.0 / eta;
     return renormalized(d * inv_eta + n * (cos_i * inv_eta - cos_t));
 }
+
+// Chance takes reflection or refraction in proportion to their light. Where a glance is told which way to go it weighs as many times
+// more as half of the glances are fewer than all: what glass reflects is a twentieth of what comes, and left to chance it is noise.
+fn sample_dielectric(x: Interaction, u: Draws) -> Scattered {
+    // The index inside over the index outside.
+    let ior = x.material.exponent;
+    let eta = select(1.0 / ior, ior, x.outside);
+    let fresnel = refraction(x.cos_o, eta);
+    let by_chance = x.way == BY_CHANCE;
+    let crosses = select(x.way == CROSSES, u.lobe < fresnel.transmitted, by_chance);
+    let share = select(2.0 * select(1.0 - fresnel.transmitted, fresnel.transmitted, crosses), 1.0, by_chance);
+    let wi = select(mirrored(-x.wo, x.n), refracted(-x.wo, x.n, x.cos_o, fresnel.cos_t, eta), crosses);
+    let weight = select(vec3f(1.0), x.material.color, crosses) * share;
+    return Scattered(wi, weight, 0.0, true, select(x.medium, select(x.parent, x.solid, x.outside), crosses));
+}

@@ -1,9 +1,8 @@
-//! The tree of light clusters that `shaders/light_tree.wgsl` goes down: balanced, so that all choices take as many steps.
+//! The tree of light clusters by which one of many lights is chosen (`shaders/light/choose_by_tree.wgsl`): balanced, so that all choices take as many steps.
 
-use crate::world::{World, WorldLight};
+use super::{World, WorldLight};
 use glam::DVec3;
 use std::f64::consts::PI;
-use std::fmt::Write as _;
 
 /// Lights of one cluster at the end of the tree, among which the closed form chooses: the shader knows it.
 pub(crate) const LIGHTS_A_CLUSTER: usize = 4;
@@ -40,22 +39,14 @@ pub(crate) fn ends(lights: usize) -> usize {
     lights.div_ceil(LIGHTS_A_CLUSTER).next_power_of_two()
 }
 
-/// The constants of the shader.
-pub(super) fn constants(world: &World) -> String {
-    let ends = ends(world.lights.len());
-    let mut s = String::new();
-    for (name, value) in [
-        ("LIGHT_CLUSTERS", ends),
-        ("LIGHT_LEVELS", ends.ilog2() as usize),
-    ] {
-        let _ = writeln!(s, "const {name}: u32 = {value}u;");
-    }
-    s
+/// Steps from the whole of so many lights to a cluster at the end.
+pub(crate) fn levels(lights: usize) -> u32 {
+    ends(lights).ilog2()
 }
 
-/// Loop trips of one choice, and of one look-up of a probability.
-pub(super) fn trips(world: &World) -> u64 {
-    u64::from(ends(world.lights.len()).ilog2())
+/// Whether so many lights are chosen among by a tree.
+pub(crate) fn serves(lights: usize) -> bool {
+    lights > MOST_LOOKED_AT
 }
 
 impl LightTree {
@@ -103,7 +94,7 @@ impl LightTree {
 
 /// By how much the channels of a light count when one is chosen: half by luminance, half alike. By luminance alone a blue
 /// light is so rarely chosen that blue is almost all of the error of a picture, and alike for all the luminance suffers.
-pub(super) const LIGHT_COLORS: DVec3 = DVec3::new(0.273, 0.5243, 0.2027);
+pub(crate) const LIGHT_COLORS: DVec3 = DVec3::new(0.273, 0.5243, 0.2027);
 
 /// What a light sends out, up to a factor.
 fn power(l: &WorldLight) -> f64 {

@@ -11,7 +11,7 @@ struct Surface {
     offset: f32,
     // Identities of the faces of parts 0, 1, 2: 1 + the key of the first face in the same plane.
     faces: vec3u,
-    // Index into `materials`; lights have none.
+    // Number of its material; lights have none.
     material: u32,
     // axis . p on a cylinder's top.
     top: f32,
@@ -40,10 +40,6 @@ struct Material {
     // Phong exponent, or index of refraction inside over outside.
     exponent: f32,
 }
-
-@group(0) @binding(0) var<storage, read> surfaces: array<Surface>;
-@group(0) @binding(1) var<storage, read> materials: array<Material>;
-@group(0) @binding(2) var<storage, read> lights: array<DiskLight>;
 
 struct Vertex {
     // On the surface.
@@ -87,7 +83,7 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
     var v = round;
 #endif
 #endif
-#if HUGE
+#if HUGE_SPHERE
     // axis: the normal at the pole; offset: the curvature. Down along the normal by the height.
     let w = p - s.point;
     let normal = normalize(s.axis + s.offset * w);

@@ -11,12 +11,8 @@ const BY_MIRROR: u32 = 0x40000000u;
 const SENT: u32 = 0x80000000u;
 const SENT_AND_MET: u32 = 0xc0000000u;
 const ASTRAY: u32 = 0xffffffffu;
-// The mirror's number, in the lowest bits, and the light's above it.
-const MIRROR_BITS: u32 = 15u;
-const MIRROR_MASK: u32 = 0x7fffu;
-
-// Turns of the path loop for one in which paths are sent. 8 and 12 were as fast, 2, 4, 6 and 16 slower.
-const TURNS: u32 = 8u;
+// The mirror's number, in the lowest MIRROR_BITS, and the light's above it.
+const MIRROR_MASK: u32 = (1u << MIRROR_BITS) - 1u;
 
 // Where the ball is met at less than this cosine its light is left to chance. There the image is so narrow that it holds next
 // to nothing, and Newton's method may fail; elsewhere its four steps are right to 1e-6, by a million random places.
@@ -104,7 +100,7 @@ fn sample_image(p: vec3f, ball: Sphere, light: DiskLight, u: vec2f) -> ImageSamp
     // where the ray would go through.
     let found = abs(before.x * m.y - before.y * m.x) < 0.01 && fmin(cos, cos_onward) > 0.5 * LEAST_IMAGE_COS;
     let seen = found && cos_light > 0.0 && inverse.x < 1.0;
-    let inverse_pdf = 3.14159265 * radius * radius * cos_light * cos / fmax(growth, TINY);
+    let inverse_pdf = PI * radius * radius * cos_light * cos / fmax(growth, TINY);
     return ImageSample(d, select(0.0, inverse_pdf, seen));
 }
 
