@@ -1,4 +1,4 @@
-//! Why a command ends without success, and the exit status that says so.
+//! Failures of a command, and their exit statuses.
 
 use crate::engine::EngineError;
 use crate::output::FileError;

@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_largest_picture_is_refused_with_numbers_and_a_small_one_is_not() {
+    fn pictures_too_large_for_memory_are_refused() {
         check(512 * 384).unwrap();
         if available().is_some() {
             let message = check(1 << 40).unwrap_err().to_string();

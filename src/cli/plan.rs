@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_film_holds_counts() {
+    fn samples_in_the_film_count() {
         let whole = rect(0, 0, 4, 4);
         let end = |held: &[(u64, u64)], wanted| {
             let mut c = Coverage::default();
@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_that_hold_nothing_need_all() {
+    fn pixels_without_samples_need_all() {
         let mut c = Coverage::default();
         c.add(rect(0, 0, 2, 4), 0..500);
         assert_eq!(end_for(100, &[rect(0, 0, 4, 4)], &c), 100);

@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kill_costs_at_most_an_interval_and_saving_at_most_half_of_the_time() {
+    fn a_kill_loses_at_most_an_interval_and_saving_takes_at_most_half_the_time() {
         for (interval, call, took) in [
             (60_000, 400, 100),
             (60_000, 400, 20_000),

@@ -129,7 +129,7 @@ impl GpuEngine {
         };
         if kernel.trips_per_sample > gpu.trip_limit {
             return Err(unable(format!(
-                "one path of this scene may take {} loop trips (max_depth {}), and this driver silently stops an \
+                "one path of this scene may take {} loop iterations (max_depth {}), but this driver silently stops an \
                  invocation at 65535; lower max_depth or use --backend cpu",
                 kernel.trips_per_sample, settings.max_depth
             )));
@@ -184,7 +184,7 @@ impl GpuEngine {
             pollster::block_on(scope.pop()),
         ];
         if let Some(error) = errors.into_iter().flatten().next() {
-            return Err(unable(format!("the kernel was refused: {error}")));
+            return Err(unable(format!("the driver rejected the kernel: {error}")));
         }
         let seen = (kernel.sight > 0).then(|| SeenLights::new(world, settings, kernel.sight));
         let mut engine = Self {
@@ -265,7 +265,7 @@ impl GpuEngine {
             // What failed for want of memory is invalid where it is used: the first cause is told.
             if let Some(e) = pollster::block_on(oom.pop()).or(invalid) {
                 return Err(format!(
-                    "no memory for a tile of {} x {} pixels: {e}",
+                    "not enough memory for a tile of {} x {} pixels: {e}",
                     size[0], size[1]
                 ));
             }
@@ -299,7 +299,7 @@ impl GpuEngine {
             if stuck > 0 {
                 let (x, y) = ((stuck - 1) % rect.width(), (stuck - 1) / rect.width());
                 return Err(format!(
-                    "one path of pixel {}, {} takes more than {} loop trips, and this driver silently stops an \
+                    "one path of pixel {}, {} takes more than {} loop iterations, but this driver silently stops an \
                      invocation at 65535; lower max_depth or use --backend cpu",
                     rect.x0 + x,
                     rect.y0 + y,

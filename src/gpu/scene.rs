@@ -107,7 +107,7 @@ pub(super) fn too_large(packed: &Packed, limits: &wgpu::Limits) -> Option<String
     for (what, count, bytes) in sizes {
         if bytes as u64 > bound {
             return Some(format!(
-                "{count} {what} need a storage buffer of {bytes} bytes, it binds {bound} at most"
+                "{count} {what} need a storage buffer of {bytes} bytes, but it allows at most {bound}"
             ));
         }
     }
@@ -115,7 +115,7 @@ pub(super) fn too_large(packed: &Packed, limits: &wgpu::Limits) -> Option<String
     let most = limits.max_texture_dimension_2d;
     (rows > most as usize).then(|| {
         format!(
-            "{} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, it has {most} at most",
+            "{} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, but it allows at most {most}",
             packed.surfaces.len()
         )
     })
