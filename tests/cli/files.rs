@@ -71,7 +71,7 @@ fn render_never_overwrites_its_scene() {
             &bench,
             &[(
                 &cpu("x.png -o link.png"),
-                "link.png: that is the scene x.png, which",
+                "link.png would overwrite the scene x.png",
             )],
         );
     }
