@@ -76,7 +76,7 @@ fn usable(adapter: &wgpu::Adapter) -> Result<(), String> {
     let storage = adapter.get_texture_format_features(wgpu::TextureFormat::Rgba32Float);
     if limits.max_compute_invocations_per_workgroup < WORKGROUP {
         return Err(format!(
-            "it runs {} invocations a workgroup, {WORKGROUP} are needed",
+            "it allows only {} invocations per workgroup, but {WORKGROUP} are needed",
             limits.max_compute_invocations_per_workgroup
         ));
     }
@@ -130,7 +130,7 @@ impl Gpu {
             let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
             let wanted = choice.name.as_deref().unwrap_or_default();
             GpuError::NoAdapter(format!(
-                "no adapter's name contains {wanted:?}; there are: {}",
+                "no adapter has a name that contains {wanted:?}; the adapters are: {}",
                 names.join(", ")
             ))
         }))
@@ -205,5 +205,5 @@ fn open_device(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), S
         memory_hints: wgpu::MemoryHints::MemoryUsage,
         ..Default::default()
     }))
-    .map_err(|e| format!("it gives no device: {e}"))
+    .map_err(|e| format!("can't open a device: {e}"))
 }

@@ -185,7 +185,7 @@ impl GpuEngine {
             pollster::block_on(scope.pop()),
         ];
         if let Some(error) = errors.into_iter().flatten().next() {
-            return Err(unable(format!("the kernel was refused: {error}")));
+            return Err(unable(format!("the driver rejected the kernel: {error}")));
         }
         let seen = (kernel.sight > 0).then(|| SeenLights::new(world, settings, kernel.sight));
         let mut engine = Self {
@@ -266,7 +266,7 @@ impl GpuEngine {
             // What failed for want of memory is invalid where it is used: the first cause is told.
             if let Some(e) = pollster::block_on(oom.pop()).or(invalid) {
                 return Err(format!(
-                    "no memory for a tile of {} x {} pixels: {e}",
+                    "not enough memory for a tile of {} x {} pixels: {e}",
                     size[0], size[1]
                 ));
             }

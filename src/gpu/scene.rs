@@ -112,7 +112,7 @@ pub(super) fn too_large(packed: &Packed, surfaces: usize, limits: &wgpu::Limits)
             let bytes = size_of_val(&arrays.surfaces[..]).max(size_of_val(&arrays.materials[..]));
             (bytes as u64 > bound).then(|| {
                 format!(
-                    "{surfaces} surfaces need a storage buffer of {bytes} bytes, it binds {bound} at most"
+                    "{surfaces} surfaces need a storage buffer of {bytes} bytes, but it allows at most {bound}"
                 )
             })
         }
@@ -121,7 +121,7 @@ pub(super) fn too_large(packed: &Packed, surfaces: usize, limits: &wgpu::Limits)
             let most = limits.max_texture_dimension_2d;
             (rows > most as usize).then(|| {
                 format!(
-                    "{surfaces} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, it has {most} at most"
+                    "{surfaces} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, but it allows at most {most}"
                 )
             })
         }

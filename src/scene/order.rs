@@ -1,8 +1,8 @@
-//! One order for scenes that mean the same: whoever shuffles a file's tables, or renames its materials, gets the same
-//! bits and the same hash.
+//! A canonical order for scenes with the same meaning. Reordering the tables of a file, or renaming its materials, changes
+//! neither the picture's bits nor the hash.
 //!
-//! Order in the file matters among surfaces of one kind that coincide, and for nothing else. So everything is sorted by
-//! what it is, and then those that coincide change places among themselves until they stand as in the file.
+//! Order in the file matters only among surfaces of one kind that coincide. So all surfaces are sorted by their values, and
+//! then each group that coincides is put back into file order.
 
 use super::check::may_coincide;
 use super::{Bsdf, Light, Material, Primitive, Scene, Shape};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-/// A scene in its one order, with the materials that are in use, each once: hash and world are made from it.
+/// A scene in canonical order, with only the materials in use and without duplicates. Hash and world are made from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canonical(Scene);
 
@@ -60,10 +60,10 @@ fn canonical(scene: &Scene) -> Scene {
     s
 }
 
-/// Numbers that tell one thing from another, as bits with their order.
+/// The numbers that identify an object, as bits in the same order.
 type Key = [u64; 12];
 
-/// How many numbers of a key lie side by side while things are sorted: kind, size and two coordinates tell most apart.
+/// How many numbers of a key are stored together for sorting: kind, size and two coordinates distinguish most objects.
 const FIRST: usize = 4;
 
 fn key(numbers: impl IntoIterator<Item = f64>) -> Key {
@@ -348,7 +348,7 @@ impl Grid {
 /// Calls `visit` with all pairs of shapes of one kind whose balls meet, and some more.
 fn for_each_near_pair(shapes: &[Shape], mut visit: impl FnMut(usize, usize)) {
     let grid = Grid::new(shapes);
-    // Most have nothing near them, which any thread can tell.
+    // Most objects have no near neighbour, which can be checked in parallel.
     let all = (0..shapes.len()).into_par_iter();
     let some_near: Vec<usize> =
         (all.filter(|&k| grid.near(k, |_| ControlFlow::Break(())).is_break())).collect();

@@ -16,7 +16,7 @@ pub const CASES: &[Case] = &[
     Case {
         row: "33",
         name: "phong_furnace",
-        what: "albedo for ks = 1 under an even sky, n = 0 to 1000: pow(0, 0), lobes that are cut off",
+        what: "albedo for ks = 1 under a uniform sky, n = 0 to 1000: pow(0, 0), truncated lobes",
         run: furnace,
     },
     Case {
@@ -28,7 +28,7 @@ pub const CASES: &[Case] = &[
     Case {
         row: "35",
         name: "phong_reciprocity",
-        what: "f(ωi, ωo) against f(ωo, ωi): asymmetry of rounding",
+        what: "f(ωi, ωo) compared with f(ωo, ωi): asymmetric rounding",
         run: reciprocity,
     },
 ];

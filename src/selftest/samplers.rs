@@ -1,4 +1,4 @@
-//! Every sampler at the ends of its random numbers.
+//! Every sampler with its smallest and largest random numbers.
 
 use super::Case;
 use super::backend::{Backend, Numbers, Trouble};
@@ -13,7 +13,7 @@ use glam::DVec3;
 pub const CASES: &[Case] = &[Case {
     row: "39",
     name: "sampler_end_points",
-    what: "every sampler at random numbers 0, 2⁻²⁴ and 1 - 2⁻²⁴: end points",
+    what: "every sampler at the random numbers 0, 2⁻²⁴ and 1 - 2⁻²⁴: end points",
     run: end_points,
 }];
 

@@ -128,7 +128,7 @@ fn a_path_that_cannot_be_cut_is_refused_and_named() {
     assert!(
         refused
             .to_string()
-            .contains("takes more than 300 loop trips"),
+            .contains("takes more than 300 loop iterations"),
         "{refused}"
     );
 }

@@ -1,4 +1,4 @@
-//! Distances and hits, in f64, for lints alone: they decide nothing that is rendered.
+//! Distances and hits in f64. Only the lints use them, never rendering.
 
 use crate::scene::{Light, Shape};
 use glam::DVec3;
