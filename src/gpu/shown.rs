@@ -3,10 +3,9 @@
 use super::seen::around;
 use crate::film::coverage::Rect;
 use crate::kernel::BRANCH_SHIFT;
-use crate::reference::camera::camera_ray;
-use crate::reference::{Estimator, Hit, Met, Ray, Tracer};
 use crate::scene::Bsdf;
 use crate::settings::Settings;
+use crate::world::trace::{Hit, Met, Ray, camera_ray};
 use crate::world::{Geometry, World};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -37,7 +36,8 @@ type Sights = [Reached; 1 + TURNS];
 
 /// What mirrors and glass show of lights.
 pub(super) struct Shown {
-    tracer: Tracer,
+    world: World,
+    size: [u32; 2],
     /// The last vertex at which lights are looked for.
     sight: u32,
     /// Of each mirror and each thing of glass, as [`around`] says.
@@ -72,7 +72,8 @@ impl Shown {
         });
         Self {
             around: bounds.collect(),
-            tracer: Tracer::new(world.clone(), settings.clone(), Estimator::NoLightSampling),
+            world: world.clone(),
+            size: settings.size,
             sight,
             fine: FINE_WIDTH.div_ceil(width).clamp(1, FINEST),
         }
@@ -81,18 +82,13 @@ impl Shown {
     /// What is seen at a place of the film.
     fn at(&self, x: f64, y: f64) -> Sights {
         let mut sights = Sights::default();
-        let mut ray = camera_ray(
-            &self.tracer.world().camera,
-            self.tracer.settings().size,
-            x,
-            y,
-        );
+        let mut ray = camera_ray(&self.world.camera, self.size, x, y);
         let mut by_chance = false;
         for depth in 1..=self.sight {
-            let Some(hit) = self.tracer.intersect(&ray) else {
+            let Some(hit) = self.world.intersect(&ray) else {
                 break;
             };
-            let Some(next) = self.tracer.specular(&hit, &ray, false) else {
+            let Some(next) = self.world.specular(&hit, &ray, false) else {
                 if depth > 1 {
                     sights[0] = self.reached(&hit, depth, by_chance);
                 }
@@ -101,7 +97,7 @@ impl Shown {
             if next.medium != ray.medium {
                 by_chance = true;
                 if let Some(turned) = sights.get_mut(depth as usize) {
-                    let reflected = self.tracer.specular(&hit, &ray, true);
+                    let reflected = self.world.specular(&hit, &ray, true);
                     *turned = reflected.map_or(Reached::default(), |ray| self.end(ray, depth + 1));
                 }
             }
@@ -113,10 +109,10 @@ impl Shown {
     /// What a ray reaches that chance has sent towards vertex `depth`.
     fn end(&self, mut ray: Ray, depth: u32) -> Reached {
         for depth in depth..=self.sight {
-            let Some(hit) = self.tracer.intersect(&ray) else {
+            let Some(hit) = self.world.intersect(&ray) else {
                 break;
             };
-            match self.tracer.specular(&hit, &ray, false) {
+            match self.world.specular(&hit, &ray, false) {
                 Some(next) => ray = next,
                 None => return self.reached(&hit, depth, true),
             }

@@ -19,6 +19,7 @@ mod faces;
 mod geometry;
 mod media;
 mod origin;
+pub mod trace;
 mod tree;
 
 pub use geometry::Geometry;
