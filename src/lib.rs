@@ -9,6 +9,7 @@
 
 pub mod bench;
 pub mod cli;
+mod coincidence;
 pub mod compare;
 pub mod engine;
 pub mod film;

@@ -5,10 +5,10 @@ mod common;
 use common::{cpu, film, gpu, scene, settings};
 use etendue::film::Film;
 use etendue::reference::Estimator;
-use etendue::reference::camera::camera_ray;
 use etendue::reference::radiosity::{Room, Solution};
 use etendue::scene::Scene;
 use etendue::world::World;
+use etendue::world::trace::camera_ray;
 use glam::DVec3;
 
 /// Patches a side of a wall: what a finer solution would change is below 5·10⁻⁴ of a wall's radiance.

@@ -1,8 +1,8 @@
 //! Dispatches: samples are cut into submissions by measured cost, which touches no bit of the picture.
 
+use super::glances::GlanceMarks;
 use super::held::{Held, count_row, goes_on};
 use super::pack::pack;
-use super::seen::SeenLights;
 use super::tile::{self, Tile};
 use super::work::{Work, coprime_stride, workgroups};
 use super::{Choice, Gpu, GpuError, scene};
@@ -36,7 +36,7 @@ pub struct GpuEngine {
     params: wgpu::Buffer,
     tile: Option<Tile>,
     /// Where lights are seen, if the kernel asks.
-    seen: Option<SeenLights>,
+    seen: Option<GlanceMarks>,
     /// The tile whose marks are on the device.
     marked: Option<Rect>,
     /// What the tile's textures hold since the last call, as it was read back.
@@ -187,7 +187,7 @@ impl GpuEngine {
         if let Some(error) = errors.into_iter().flatten().next() {
             return Err(unable(format!("the driver rejected the kernel: {error}")));
         }
-        let seen = (kernel.sight > 0).then(|| SeenLights::new(world, settings, kernel.sight));
+        let seen = (kernel.sight > 0).then(|| GlanceMarks::new(world, settings, kernel.sight));
         let mut engine = Self {
             kernel,
             pipeline,

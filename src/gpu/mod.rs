@@ -2,14 +2,13 @@
 
 mod adapters;
 mod engine;
+mod glances;
 mod held;
 pub mod pack;
 pub mod probe;
 #[cfg(test)]
 mod same_hits;
 mod scene;
-mod seen;
-mod shown;
 mod tile;
 mod work;
 

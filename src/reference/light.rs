@@ -113,10 +113,9 @@ pub fn pdf(light: &WorldLight, point: DVec3, direction: DVec3) -> f64 {
 mod tests {
     use super::*;
     use crate::reference::chi_square::{assert_agrees, mean_and_error};
-    use crate::reference::disk;
     use crate::reference::radiosity::form_factor;
     use crate::reference::sampler::Sampler;
-    use crate::reference::tracer::Ray;
+    use crate::world::trace::{Ray, disk};
 
     fn light(center: DVec3, normal: DVec3, radius: f64, emitted: f64) -> WorldLight {
         WorldLight {

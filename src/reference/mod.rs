@@ -4,29 +4,20 @@
 //! GPU and nothing else. Two estimators of the same picture: agreement between one that samples lights and one
 //! that only ever finds them by chance leaves little room for an error in either.
 
-pub mod camera;
-pub mod cylinder;
-pub mod dielectric;
 pub mod diffuse;
-pub mod disk;
 pub mod frame;
 pub mod light;
-pub mod mirror;
 pub mod path;
 pub mod phong;
-pub mod plane;
 pub mod radiosity;
 pub mod sampler;
-pub mod sphere;
 pub mod tracer;
 
-#[cfg(test)]
-mod brute_force;
 #[cfg(test)]
 mod chi_square;
 
 pub use sampler::Sampler;
-pub use tracer::{Hit, Met, Ray, Tracer};
+pub use tracer::Tracer;
 
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::coverage::Rect;

@@ -3,14 +3,15 @@
 //! Vertices are numbered from 1, the first thing the eye sees. Light found at vertex k has been scattered k - 1
 //! times; light sampled at vertex k is found at a vertex k + 1.
 
-use super::camera::camera_ray;
 use super::phong::Phong;
 use super::sampler::{Sampler, stratum};
-use super::tracer::{Hit, Met, Ray, Tracer};
-use super::{Estimator, dielectric, diffuse, light, mirror};
+use super::tracer::Tracer;
+use super::{Estimator, diffuse, light};
 use crate::scene::Bsdf;
 use crate::settings::Integrator;
 use crate::world::WorldPrimitive;
+use crate::world::trace::dielectric::{self, Boundary};
+use crate::world::trace::{Hit, Met, Ray, camera_ray, mirror};
 use glam::DVec3;
 
 /// The first vertex at which a path may be ended by chance: short paths are cheap, and roulette adds noise.
@@ -73,7 +74,7 @@ impl Tracer {
             rng.start_vertex(vertex);
             let u = [(); 4].map(|()| rng.uniform());
             traced.rays += 1;
-            let Some(hit) = self.intersect(&ray) else {
+            let Some(hit) = self.world.intersect(&ray) else {
                 break;
             };
 
@@ -136,29 +137,6 @@ impl Tracer {
         traced
     }
 
-    /// Where `ray` goes on from a mirror, or from glass: into it or out of it if it can, or by reflection if it `reflects`.
-    /// `None` from other surfaces.
-    pub fn specular(&self, hit: &Hit, ray: &Ray, reflects: bool) -> Option<Ray> {
-        let Met::Primitive(index) = hit.met else {
-            return None;
-        };
-        let primitive = &self.world.primitives[index];
-        if !matches!(
-            self.world.materials[primitive.material],
-            Bsdf::Mirror { .. } | Bsdf::Dielectric { .. }
-        ) {
-            return None;
-        }
-        let u = [if reflects { 1.0 } else { 0.0 }; 3];
-        let scattered = self.scatter(primitive, hit, ray, u)?;
-        Some(Ray {
-            origin: hit.point,
-            direction: scattered.direction,
-            medium: scattered.medium,
-            face: hit.face,
-        })
-    }
-
     /// Whether the picture keeps light that has been scattered `times` times.
     fn keeps(&self, times: u32) -> bool {
         self.settings.light.keeps(times)
@@ -205,7 +183,7 @@ impl Tracer {
                 face: hit.face,
             };
             *rays += 1;
-            if self.occluded(&shadow, index) {
+            if self.world.occluded(&shadow, index) {
                 continue;
             }
             let density = f64::from(count) * probability * pdf;
@@ -279,9 +257,7 @@ impl Tracer {
                 ..same_side
             }),
             Bsdf::Dielectric { ior, transmittance } => {
-                let leaving = ray.medium == primitive.solid;
-                // Index beyond the boundary over the index on the ray's side, which is the eye's.
-                let eta = if leaving { 1.0 / ior } else { ior };
+                let Boundary { eta, beyond } = Boundary::new(primitive, ior, ray.medium);
                 let (direction, crossed) = dielectric::sample(ray.direction, hit.normal, eta, u[0]);
                 if !crossed {
                     return Some(Scattered {
@@ -293,11 +269,7 @@ impl Tracer {
                     direction,
                     weight: transmittance,
                     pdf: None,
-                    medium: if leaving {
-                        primitive.parent
-                    } else {
-                        primitive.solid
-                    },
+                    medium: beyond,
                     index_ratio: 1.0 / (eta * eta),
                 })
             }

@@ -3,7 +3,7 @@
 
 use super::diffuse;
 use super::frame::direction_about;
-use super::mirror::reflect;
+use crate::world::trace::mirror::reflect;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -86,9 +86,9 @@ impl Phong {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::brute_force::random_direction;
     use crate::reference::chi_square::{assert_density, mean_and_error};
     use crate::reference::sampler::Sampler;
+    use crate::world::trace::brute_force::random_direction;
     use std::f64::consts::FRAC_1_PI;
 
     fn gloss(kd: f64, ks: f64, exponent: f64) -> Phong {

@@ -7,8 +7,6 @@ mod geometry;
 mod lights;
 mod open;
 
-pub(super) use coincide::may_coincide;
-
 use super::source::quoted;
 use super::{Bsdf, Diagnostic, Place, Primitive, Scene};
 use glam::DVec3;
@@ -19,9 +17,6 @@ pub const MAX_PAIRWISE: usize = 2000;
 
 /// Warnings of one kind that are written out; the rest are counted.
 pub const MAX_ALIKE: usize = 10;
-
-/// Surfaces closer than this, relative to their size, coincide.
-const COINCIDENT: f64 = crate::world::COINCIDENT;
 
 /// Warnings of one kind.
 #[derive(Default)]

@@ -13,6 +13,7 @@ mod reader;
 mod rows;
 pub mod schema;
 mod source;
+mod surfaces;
 mod value;
 
 pub use order::Canonical;

@@ -4,8 +4,8 @@
 //! Order in the file matters only among surfaces of one kind that coincide. So all surfaces are sorted by their values, and
 //! then each group that coincides is put back into file order.
 
-use super::check::may_coincide;
 use super::{Bsdf, Light, Material, Primitive, Scene, Shape};
+use crate::coincidence::COINCIDENT;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -38,7 +38,7 @@ fn canonical(scene: &Scene) -> Scene {
         let (p, q) = (&s.primitives[in_order[a]], &s.primitives[in_order[b]]);
         // Of one opaque material, either shows the same.
         let alike = p.material == q.material && !matches!(bsdf(p), Bsdf::Dielectric { .. });
-        !alike && may_coincide(&p.shape, &q.shape)
+        !alike && p.shape.may_coincide(&q.shape)
     };
     let kept = keep_file_order(&in_order, &shapes, decides);
     s.primitives = kept.iter().map(|&i| s.primitives[i]).collect();
@@ -54,7 +54,7 @@ fn canonical(scene: &Scene) -> Scene {
     };
     let shapes: Vec<Shape> = in_order.iter().map(disk).collect();
     let kept = keep_file_order(&in_order, &shapes, |a, b| {
-        may_coincide(&shapes[a], &shapes[b])
+        shapes[a].may_coincide(&shapes[b])
     });
     s.lights = kept.iter().map(|&i| s.lights[i]).collect();
     s
@@ -212,7 +212,7 @@ impl Groups {
 /// A ball that meets that of every other shape of the kind with which this one may coincide.
 fn place(shape: &Shape) -> (DVec3, f64) {
     // Ten times the tolerance: what coincides with one thing may coincide with another through it.
-    const SLACK: f64 = 10.0 * crate::world::COINCIDENT;
+    const SLACK: f64 = 10.0 * COINCIDENT;
     let (center, reach) = match *shape {
         Shape::Sphere { center, radius } => (center, SLACK * radius),
         // The point nearest the file's origin is the same for either direction of the normal.

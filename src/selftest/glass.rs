@@ -4,8 +4,8 @@ use super::Case;
 use super::backend::{Backend, Numbers, Trouble};
 use super::build::{AIR_IN_GLASS, Build, GLASS, cylinder, sphere, v};
 use super::measure::{Measure, Tolerance};
-use crate::reference::dielectric;
 use crate::scene::{Bsdf, Shape};
+use crate::world::trace::dielectric;
 use glam::DVec3;
 
 pub const CASES: &[Case] = &[

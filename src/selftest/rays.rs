@@ -4,8 +4,10 @@ use super::backend::{Backend, Numbers, OpenGpu, Trouble, written};
 use super::build::Build;
 use crate::gpu::probe::{Probe, Values};
 use crate::kernel::{Access, scene_probe_source};
-use crate::reference::{Estimator, Met, Ray, Sampler, Tracer, frame};
+use crate::reference::{Sampler, frame};
+use crate::settings::Settings;
 use crate::world::World;
+use crate::world::trace::{Met, Ray};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -110,7 +112,8 @@ const OCCLUDED: &str = "
 /// A scene to shoot rays into.
 pub struct Range<'a> {
     backend: &'a Backend,
-    tracer: Tracer,
+    world: World,
+    settings: Settings,
     access: Access,
 }
 
@@ -124,14 +127,15 @@ impl<'a> Range<'a> {
             .unwrap_or_else(|| Access::choose_for(&world, &backend.device()));
         Self {
             backend,
-            tracer: Tracer::new(world, settings, Estimator::LightSampling),
+            world,
+            settings,
             access,
         }
     }
 
     /// The scene; shots are in its coordinates.
     pub fn world(&self) -> &World {
-        self.tracer.world()
+        &self.world
     }
 
     /// Number of the first surface whose primitive is as `wanted` says.
@@ -179,7 +183,7 @@ impl<'a> Range<'a> {
     }
 
     fn run(&self, open: &OpenGpu, body: &str, inputs: &[Values]) -> Result<Vec<Numbers>, Trouble> {
-        let source = scene_probe_source(self.world(), self.tracer.settings(), self.access, body);
+        let source = scene_probe_source(self.world(), &self.settings, self.access, body);
         let mut probes = open.probes.lock().unwrap_or_else(|p| p.into_inner());
         let probe = match probes.get(&source) {
             Some(probe) => probe.clone(),
@@ -214,7 +218,7 @@ impl<'a> Range<'a> {
             face: s.face,
         };
         let mut landing = Landing::default();
-        if let Some(hit) = self.tracer.intersect(&ray) {
+        if let Some(hit) = self.world.intersect(&ray) {
             landing.surface = Some(match hit.met {
                 Met::Light { index, .. } => index,
                 Met::Primitive(index) => self.world().lights.len() + index,
@@ -225,7 +229,7 @@ impl<'a> Range<'a> {
             }
         }
         if let Some((light, _)) = s.aim {
-            landing.occluded = self.tracer.occluded(&ray, light);
+            landing.occluded = self.world.occluded(&ray, light);
         }
         landing
     }

@@ -1,6 +1,7 @@
 //! Identities of faces: planar faces that coincide share one, and one equation.
 
-use super::{COINCIDENT, Geometry, WorldLight, WorldPrimitive, face, key};
+use super::{Geometry, WorldLight, WorldPrimitive, face, key};
+use crate::coincidence::{self, COINCIDENT};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 
@@ -184,16 +185,9 @@ impl Planes {
 }
 
 fn coincide(plane: &Shared, face: &Face) -> bool {
-    if plane.normal.cross(face.normal).length() > COINCIDENT {
-        return false;
-    }
-    // Two infinite planes are compared at their points nearest the origin.
-    let size = if face.size.is_finite() {
-        face.size
-    } else {
-        plane.offset.abs().max(face.offset.abs())
-    };
-    (plane.normal.dot(face.center) - plane.offset).abs() <= COINCIDENT * size
+    let height = plane.normal.dot(face.center) - plane.offset;
+    let size = coincidence::face_size(face.size, [plane.offset, face.offset]);
+    coincidence::in_plane([plane.normal, face.normal], height, size, COINCIDENT)
 }
 
 /// Gives the owner of a face the plane's identity and equation; a cylinder keeps its own axis while it

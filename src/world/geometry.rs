@@ -1,6 +1,6 @@
 //! Shapes in world space.
 
-use super::COINCIDENT;
+use crate::coincidence::slack;
 use crate::scene::Shape;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -135,7 +135,7 @@ impl Geometry {
         // Whether the disk's extent along `n` about its centre lies below the plane n.p = offset, or above.
         let against = |n: DVec3, offset: f64| {
             let (height, reach) = (n.dot(center) - offset, size * n.cross(normal).length());
-            let slack = COINCIDENT * size;
+            let slack = slack(size);
             let (below, above) = (height + reach <= slack, height - reach >= -slack);
             // Flush, it lies on the side to which it faces.
             let outwards = n.dot(normal) > 0.0;
@@ -148,7 +148,7 @@ impl Geometry {
                 let v = center - c;
                 let along = v.dot(normal);
                 let across = (v - normal * along).length();
-                let slack = COINCIDENT * radius;
+                let slack = slack(radius);
                 sorted(
                     along.hypot(across + size) <= radius + slack,
                     along.hypot((across - size).max(0.0)) >= radius - slack,
@@ -166,7 +166,7 @@ impl Geometry {
             } => {
                 let m = center - base;
                 let out = (m - axis * axis.dot(m)).length();
-                let slack = COINCIDENT * radius;
+                let slack = slack(radius);
                 let (under_top, over_top) = against(axis, offsets[1]);
                 let (over_base, under_base) = against(-axis, -offsets[0]);
                 sorted(

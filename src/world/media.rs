@@ -2,7 +2,8 @@
 //! a light shines in.
 
 use super::geometry::DiskSide;
-use super::{AIR, Bounds, COINCIDENT, Geometry, Side, Tree, WorldLight, WorldPrimitive};
+use super::{AIR, Bounds, Geometry, Side, Tree, WorldLight, WorldPrimitive};
+use crate::coincidence::{COINCIDENT, MAY_COINCIDE, parallel};
 use crate::scene::Bsdf;
 use glam::DVec3;
 
@@ -45,8 +46,8 @@ fn encloses(outer: &Geometry, inner: &Geometry, first: bool) -> bool {
     ) = (outer, inner)
     {
         // Half-spaces that are not parallel cross, and neither holds the other.
-        let parallel = normal.cross(*n).length() <= COINCIDENT && normal.dot(*n) > 0.0;
-        return parallel && (offset > o || (offset == o && first));
+        let same_way = parallel(*normal, *n, COINCIDENT) && normal.dot(*n) > 0.0;
+        return same_way && (offset > o || (offset == o && first));
     }
     let (core, volume) = inner.core();
     let larger = outer.core().1;
@@ -78,7 +79,7 @@ impl Index {
             match geometry.bounds() {
                 // What lies flush on a solid, within the tolerance, is about it too.
                 Some(b) => {
-                    let slack = (b.max - b.min) * (4.0 * COINCIDENT);
+                    let slack = (b.max - b.min) * MAY_COINCIDE;
                     boxes.push(Bounds {
                         min: b.min - slack,
                         max: b.max + slack,

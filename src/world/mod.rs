@@ -21,6 +21,7 @@ pub(crate) mod light_tree;
 mod media;
 pub(crate) mod near_light;
 mod origin;
+pub mod trace;
 mod tree;
 pub(crate) mod visibility;
 
@@ -28,15 +29,15 @@ pub use geometry::Geometry;
 pub use light_tree::MOST_LOOKED_AT;
 pub use tree::{Bounds, Node, Tree};
 
+pub use crate::coincidence::COINCIDENT;
+
+use crate::coincidence::slack;
 use crate::scene::{Bsdf, Canonical, Scene};
 use glam::DVec3;
 use media::Media;
 
 /// The medium outside every dielectric solid.
 pub const AIR: u32 = 0;
-
-/// Surfaces closer than this, relative to their size, coincide.
-pub const COINCIDENT: f64 = 1e-6;
 
 /// Where rays can be, seen from a primitive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -257,7 +258,7 @@ fn drop_what_no_path_reaches(
     let reachable = |center: DVec3, reach: &dyn Fn(DVec3) -> f64, size: f64| {
         walls
             .iter()
-            .all(|&(n, offset)| n.dot(center) + reach(n) >= offset - COINCIDENT * size)
+            .all(|&(n, offset)| n.dot(center) + reach(n) >= offset - slack(size))
     };
     let disk = |n: DVec3, normal: DVec3, radius: f64| radius * n.cross(normal).length();
     lights.retain(|l| reachable(l.center, &|n| disk(n, l.normal, l.radius), l.radius));

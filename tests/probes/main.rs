@@ -8,7 +8,7 @@ mod lights;
 use etendue::gpu::probe::{UNWRITTEN, Uniform, Values, run};
 use etendue::gpu::{Choice, Gpu};
 use etendue::kernel::ProbeFeatures;
-use etendue::reference::dielectric;
+use etendue::world::trace::dielectric;
 use glam::DVec3;
 use std::sync::LazyLock;
 

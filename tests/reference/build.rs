@@ -3,10 +3,11 @@
 use etendue::engine::{Counters, Engine};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
-use etendue::reference::{CpuEngine, Estimator, Hit, Ray, Tracer};
+use etendue::reference::{CpuEngine, Estimator};
 pub use etendue::selftest::build::*;
 use etendue::settings::Settings;
 use etendue::stats::luminance;
+use etendue::world::trace::{Hit, Ray};
 use etendue::world::{AIR, World};
 use glam::DVec3;
 use std::sync::atomic::AtomicBool;
@@ -21,7 +22,6 @@ pub fn small(eye: DVec3, look_at: DVec3, vfov: f64) -> Build {
 /// What is asked of a scene.
 pub trait Ask {
     fn world(&self) -> World;
-    fn tracer(&self) -> Tracer;
     /// A whole picture.
     fn render(&self, settings: &Settings, estimator: Estimator, samples: u64) -> (Film, Counters);
     /// Mean luminance of the picture, and its standard error.
@@ -31,10 +31,6 @@ pub trait Ask {
 impl Ask for Build {
     fn world(&self) -> World {
         World::new(&self.0, self.0.camera.resolution)
-    }
-
-    fn tracer(&self) -> Tracer {
-        Tracer::new(self.world(), self.settings(), Estimator::LightSampling)
     }
 
     fn render(&self, settings: &Settings, estimator: Estimator, samples: u64) -> (Film, Counters) {

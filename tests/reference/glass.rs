@@ -1,8 +1,9 @@
 //! Dielectrics with closed-form transmission.
 
 use crate::build::*;
-use etendue::reference::{Estimator, Met};
+use etendue::reference::Estimator;
 use etendue::scene::{Bsdf, Shape};
+use etendue::world::trace::Met;
 use etendue::world::{AIR, Geometry};
 use glam::DVec3;
 
@@ -83,34 +84,34 @@ fn glass_resting_on_the_floor_has_a_gap_of_no_width() {
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5))
         .add(cylinder(DVec3::ZERO, DVec3::Y, 0.5), GLASS)
         .light(v(0.0, 4.0, 0.0), -DVec3::Y, 1.0, 1.0);
-    let tracer = scene.tracer();
-    let rod = tracer.world().primitives[0];
+    let world = scene.world();
+    let rod = world.primitives[0];
     assert!(matches!(rod.geometry, Geometry::Cylinder { .. }));
 
-    let top = tracer.intersect(&ray(v(0.1, 3.0, 0.2), -DVec3::Y)).unwrap();
+    let top = world.intersect(&ray(v(0.1, 3.0, 0.2), -DVec3::Y)).unwrap();
     assert_eq!((top.met, top.t), (Met::Primitive(0), 2.0));
-    let cap = tracer
+    let cap = world
         .intersect(&from_hit(&top, -DVec3::Y, rod.solid))
         .unwrap();
     assert_eq!(
         (cap.met, cap.t, cap.normal),
         (Met::Primitive(0), 1.0, DVec3::Y)
     );
-    let floor = tracer
+    let floor = world
         .intersect(&from_hit(&cap, v(0.3, -1.0, 0.0), AIR))
         .unwrap();
     assert_eq!((floor.met, floor.t), (Met::Primitive(1), 0.0));
-    let back = tracer
+    let back = world
         .intersect(&from_hit(&floor, v(0.1, 1.0, 0.0), AIR))
         .unwrap();
     assert_eq!((back.met, back.t), (Met::Primitive(0), 0.0));
-    let out = tracer
+    let out = world
         .intersect(&from_hit(&back, v(0.1, 1.0, 0.0), rod.solid))
         .unwrap();
     assert_eq!(out.met, Met::Primitive(0));
     assert!((out.t - 1.01f64.sqrt()).abs() < 1e-15);
     // Total reflection at the bottom cap stays inside.
-    let inside = tracer
+    let inside = world
         .intersect(&from_hit(&cap, v(0.0, 1.0, 0.1), rod.solid))
         .unwrap();
     assert_eq!(inside.met, Met::Primitive(0));

@@ -2,8 +2,9 @@
 
 use crate::build::*;
 use etendue::film::coverage::Rect;
-use etendue::reference::{Estimator, Met};
+use etendue::reference::Estimator;
 use etendue::settings::Settings;
+use etendue::world::trace::Met;
 use etendue::world::{Geometry, WorldPrimitive};
 use glam::DVec3;
 
@@ -138,15 +139,15 @@ fn a_flush_light_is_wholly_visible_and_lights_the_room() {
         .add(plane(DVec3::ZERO, DVec3::Y), grey(0.5))
         // Flush on the ceiling and on the disk.
         .light(v(0.0, 1.0, 0.0), -DVec3::Y, 0.3, 3.0);
-    let tracer = scene.tracer();
+    let world = scene.world();
     let ceiling =
         |p: &WorldPrimitive| matches!(p.geometry, Geometry::Plane { normal, .. } if normal.y < 0.0);
-    let ceiling = tracer.world().primitives.iter().position(ceiling).unwrap();
+    let ceiling = world.primitives.iter().position(ceiling).unwrap();
     let aim = |x: f64, z: f64| ray(v(0.0, 0.4, 0.0), v(x, 0.6, z));
     for k in 0..10_000 {
         let (s, c) = f64::from(k).sin_cos();
         let r = (f64::from(k) + 0.5) / 10_000.0;
-        let hit = tracer.intersect(&aim(r * c, r * s)).unwrap();
+        let hit = world.intersect(&aim(r * c, r * s)).unwrap();
         let expected = if r < 0.3 {
             Met::Light {
                 index: 0,
@@ -158,7 +159,7 @@ fn a_flush_light_is_wholly_visible_and_lights_the_room() {
             Met::Primitive(ceiling)
         };
         assert_eq!(hit.met, expected, "{k}");
-        assert_eq!(tracer.occluded(&aim(r * c, r * s), 0), r >= 0.3);
+        assert_eq!(world.occluded(&aim(r * c, r * s), 0), r >= 0.3);
     }
 }
 

@@ -1,8 +1,8 @@
 //! What single rays meet: sides, ties, and what a path stands on.
 
 use crate::build::*;
-use etendue::reference::{Hit, Met, Ray};
 use etendue::scene::{Bsdf, Shape};
+use etendue::world::trace::{Hit, Met, Ray};
 use etendue::world::{AIR, Geometry};
 use glam::DVec3;
 
@@ -37,7 +37,7 @@ fn from_inside_a_box_every_ray_meets_the_nearest_wall_from_every_wall() {
     // Half of the normals point outwards in the file.
     .map(|n| (plane(-n, n * n.element_sum()), grey(0.5)));
     let eye = v(0.2, -0.4, 0.7);
-    let tracer = scene_of(eye, &walls).tracer();
+    let world = scene_of(eye, &walls).world();
     let nearest = |o: DVec3, d: DVec3| {
         let per_axis = (d.signum() - o) / d;
         per_axis.min_element()
@@ -46,7 +46,7 @@ fn from_inside_a_box_every_ray_meets_the_nearest_wall_from_every_wall() {
         let mut from = ray(eye, d);
         // Ten diffuse-like bounces, standing on each wall in turn.
         for next in directions(10) {
-            let hit = tracer.intersect(&from).expect("a wall");
+            let hit = world.intersect(&from).expect("a wall");
             assert!((hit.t - nearest(from.origin, from.direction)).abs() < 1e-12);
             assert!(hit.normal.dot(from.direction) < 0.0);
             assert!(hit.point.abs().max_element() < 1.0 + 1e-15);
@@ -60,12 +60,12 @@ fn from_inside_a_box_every_ray_meets_the_nearest_wall_from_every_wall() {
 fn an_eye_in_an_opaque_cylinder_sees_all_of_it_and_nothing_else() {
     let tube = (cylinder(-DVec3::Y, DVec3::Y, 0.5), MIRROR);
     let beyond = (plane(v(0.0, -2.0, 0.0), DVec3::Y), grey(0.5));
-    let tracer = scene_of(v(0.1, 0.2, 0.0), &[tube, beyond]).tracer();
+    let world = scene_of(v(0.1, 0.2, 0.0), &[tube, beyond]).world();
     let mut faces = std::collections::HashSet::new();
     for d in directions(2000) {
         let mut from = ray(v(0.1, 0.2, 0.0), d);
         for _ in 0..20 {
-            let hit = tracer.intersect(&from).expect("the tube");
+            let hit = world.intersect(&from).expect("the tube");
             assert_eq!(hit.met, Met::Primitive(0));
             let p = hit.point;
             let on_side = (p.x.hypot(p.z) - 0.5).abs() < 1e-14 && p.y.abs() <= 1.0 + 1e-14;
@@ -90,17 +90,17 @@ fn convex_things_left_from_outside_are_not_met_again() {
         ),
     ];
     let eye = v(98.5, 100.0, 90.0);
-    let tracer = scene_of(eye, &things).tracer();
+    let world = scene_of(eye, &things).world();
     let mut hits = 0;
     for d in directions(4000) {
         // Towards the two things.
-        let Some(hit) = tracer.intersect(&ray(eye, d + v(0.0, 0.0, 3.0))) else {
+        let Some(hit) = world.intersect(&ray(eye, d + v(0.0, 0.0, 3.0))) else {
             continue;
         };
         hits += 1;
         for out in directions(20) {
             let out = (out + hit.normal).normalize();
-            if let Some(again) = tracer.intersect(&from_hit(&hit, out, AIR)) {
+            if let Some(again) = world.intersect(&from_hit(&hit, out, AIR)) {
                 assert_ne!(again.met, hit.met);
             }
         }
@@ -117,9 +117,9 @@ fn coincident_faces_are_met_as_light_disk_cap_plane() {
         .add(disk(v(0.0, 1e-12, 0.0), -DVec3::Y, 2.0), grey(0.5))
         .add(cylinder(-DVec3::Y, DVec3::ZERO, 3.0), grey(0.5))
         .light(v(0.0, -1e-12, 0.0), DVec3::Y, 1.0, 1.0);
-    let tracer = scene.tracer();
+    let world = scene.world();
     let kind = |x: f64| {
-        let hit = tracer
+        let hit = world
             .intersect(&ray(v(x, 2.0, 0.7), v(0.1, -1.0, -0.35)))
             .unwrap();
         assert!(
@@ -128,7 +128,7 @@ fn coincident_faces_are_met_as_light_disk_cap_plane() {
         );
         match hit.met {
             Met::Light { .. } => "light",
-            Met::Primitive(i) => match tracer.world().primitives[i].geometry {
+            Met::Primitive(i) => match world.primitives[i].geometry {
                 Geometry::Disk { .. } => "disk",
                 Geometry::Cylinder { .. } => "cap",
                 Geometry::Plane { .. } => "plane",
@@ -148,30 +148,30 @@ fn disks_are_two_sided_and_glass_needs_the_right_medium() {
         (disk(DVec3::ZERO, DVec3::Y, 1.0), grey(0.5)),
         (sphere(v(5.0, 0.0, 0.0), 1.0), GLASS),
     ];
-    let tracer = scene_of(v(0.0, 9.0, 0.0), &things).tracer();
+    let world = scene_of(v(0.0, 9.0, 0.0), &things).world();
     for y in [-2.0, 2.0] {
-        let hit = tracer
+        let hit = world
             .intersect(&ray(v(0.5, y, 0.0), v(0.0, -y, 0.0)))
             .unwrap();
         assert_eq!((hit.t, hit.normal), (2.0, v(0.0, y.signum(), 0.0)));
         for up in [v(0.3, 1.0, 0.0), v(0.0, 1e-9, 1.0)] {
             let away = from_hit(&hit, up * y.signum(), AIR);
-            assert_eq!(tracer.intersect(&away), None);
+            assert_eq!(world.intersect(&away), None);
         }
     }
-    let glass = tracer.world().primitives[1];
+    let glass = world.primitives[1];
     let near = |hit: Option<Hit>| hit.map(|h| (h.t * 1e9).round() / 1e9);
     let mut r = ray(v(5.0, 0.0, 4.0), -DVec3::Z);
-    assert_eq!(near(tracer.intersect(&r)), Some(3.0), "enters");
+    assert_eq!(near(world.intersect(&r)), Some(3.0), "enters");
     r.medium = glass.solid;
     assert_eq!(
-        near(tracer.intersect(&r)),
+        near(world.intersect(&r)),
         Some(5.0),
         "already inside, so it leaves"
     );
     r.medium = 77;
     assert_eq!(
-        near(tracer.intersect(&r)),
+        near(world.intersect(&r)),
         None,
         "in a solid that knows nothing of it"
     );
@@ -191,13 +191,13 @@ fn rooms_of_huge_spheres_and_of_planes_are_the_same() {
     let planes = normals.map(|n| (plane(-n, n), grey(0.5)));
     for radius in [1e5, 1e7] {
         let spheres = normals.map(|n| (sphere(-n * (1.0 + radius), radius), grey(0.5)));
-        let flat = scene_of(eye, &planes).tracer();
+        let flat = scene_of(eye, &planes).world();
         let mut build = scene_of(eye, &spheres);
         // A light as near as the walls, or the spheres would not be huge beside it.
         build.0.lights[0].center = v(0.0, 0.5, 0.0);
-        let round = build.tracer();
+        let round = build.world();
         let huge = |g: Geometry| matches!(g, Geometry::HugeSphere { .. });
-        assert!(round.world().primitives.iter().all(|p| huge(p.geometry)));
+        assert!(round.primitives.iter().all(|p| huge(p.geometry)));
         for d in directions(2000) {
             let (a, b) = (flat.intersect(&ray(eye, d)), round.intersect(&ray(eye, d)));
             let (a, b) = (a.unwrap(), b.unwrap());
@@ -224,7 +224,7 @@ fn zero_and_negative_zero_directions_and_starts_on_rims_are_finite() {
         (cylinder(v(3.0, 0.0, 0.0), v(3.0, 1.0, 0.0), 1.0), GLASS),
         (disk(v(-3.0, 0.0, 0.0), DVec3::Y, 1.0), grey(0.5)),
     ];
-    let tracer = scene_of(v(0.0, 5.0, 9.0), &things).tracer();
+    let world = scene_of(v(0.0, 5.0, 9.0), &things).world();
     let origins = [
         DVec3::ZERO,
         v(3.0, 0.0, 0.0),
@@ -241,7 +241,7 @@ fn zero_and_negative_zero_directions_and_starts_on_rims_are_finite() {
                             medium,
                             ..ray(origin, d)
                         };
-                        if let Some(hit) = tracer.intersect(&r) {
+                        if let Some(hit) = world.intersect(&r) {
                             assert!(hit.t.is_finite() && hit.t >= 0.0, "{r:?}: {hit:?}");
                             assert!(
                                 hit.point.is_finite() && hit.normal.is_finite(),

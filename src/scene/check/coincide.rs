@@ -1,9 +1,9 @@
 //! Surfaces that coincide. The format defines which one a ray meets first, so the picture is well
 //! defined. But unless one object rests on another, coinciding surfaces are rarely intended.
 
-use super::{COINCIDENT, Warnings, called, is_dielectric};
+use super::{Warnings, called, is_dielectric};
+use crate::coincidence::{COINCIDENT, Flat};
 use crate::scene::{Place, Scene, Shape};
-use glam::DVec3;
 
 /// In the order in which coincident surfaces are met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -15,14 +15,10 @@ enum Rank {
     Curved,
 }
 
-/// A planar surface.
+/// A flat surface.
 struct Face {
     rank: Rank,
-    center: DVec3,
-    /// Outward for caps.
-    normal: DVec3,
-    /// Infinite for planes.
-    radius: f64,
+    flat: Flat,
 }
 
 /// A primitive or light.
@@ -69,9 +65,7 @@ fn things(scene: &Scene) -> Vec<Thing> {
         dielectric: false,
         faces: vec![Face {
             rank: Rank::Light,
-            center: l.center,
-            normal: l.normal,
-            radius: l.radius,
+            flat: l.flat(),
         }],
     });
     let primitives = scene.primitives.iter().map(|p| Thing {
@@ -86,37 +80,14 @@ fn things(scene: &Scene) -> Vec<Thing> {
 }
 
 fn faces(shape: &Shape) -> Vec<Face> {
-    let face = |rank, center, normal, radius| Face {
-        rank,
-        center,
-        normal,
-        radius,
+    let rank = match shape {
+        Shape::Sphere { .. } => Rank::Curved,
+        Shape::Plane { .. } => Rank::Plane,
+        Shape::Disk { .. } => Rank::Disk,
+        Shape::Cylinder { .. } => Rank::Cap,
     };
-    match *shape {
-        Shape::Sphere { .. } => Vec::new(),
-        Shape::Plane { point, normal } => vec![face(Rank::Plane, point, normal, f64::INFINITY)],
-        Shape::Disk {
-            center,
-            normal,
-            radius,
-        } => vec![face(Rank::Disk, center, normal, radius)],
-        Shape::Cylinder { base, top, radius } => {
-            let axis = (top - base).normalize();
-            vec![
-                face(Rank::Cap, base, -axis, radius),
-                face(Rank::Cap, top, axis, radius),
-            ]
-        }
-    }
-}
-
-/// Whether shapes of one kind have surfaces that may be in one place, by a generous measure: then their order in the
-/// file decides what is met.
-pub(in crate::scene) fn may_coincide(a: &Shape, b: &Shape) -> bool {
-    // Two surfaces may coincide through a third.
-    const SLACK: f64 = 4.0 * COINCIDENT;
-    let flat = |f: &Face| faces(b).iter().any(|g| coplanar(f, g, SLACK));
-    curved_surfaces_coincide(a, b, SLACK) || faces(a).iter().any(flat)
+    let flats = shape.flats().into_iter();
+    flats.map(|flat| Face { rank, flat }).collect()
 }
 
 /// The ranks of two surfaces that coincide and should not.
@@ -124,21 +95,21 @@ fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
     let both_opaque = !a.dielectric && !b.dielectric;
     let alike = both_opaque && a.material.is_some() && a.material == b.material;
     if let (Some(s), Some(t)) = (&a.shape, &b.shape)
-        && curved_surfaces_coincide(s, t, COINCIDENT)
+        && s.curved_coincides(t, COINCIDENT)
         // Overlapping parts of one opaque material look the same.
-        && (!alike || same_size(s, t))
+        && (!alike || same_length(s, t))
     {
         return Some((Rank::Curved, Rank::Curved));
     }
     for f in &a.faces {
         for g in &b.faces {
-            if !coplanar(f, g, COINCIDENT) {
+            if !f.flat.coincides(&g.flat, COINCIDENT) {
                 continue;
             }
-            let opposite = f.normal.dot(g.normal) < 0.0;
+            let opposite = f.flat.normal.dot(g.flat.normal) < 0.0;
             let ordinary = match (f.rank.min(g.rank), f.rank.max(g.rank)) {
                 (Rank::Light, Rank::Light) | (Rank::Plane, Rank::Plane) => false,
-                (Rank::Disk, Rank::Disk) => alike && !same_disk(f, g),
+                (Rank::Disk, Rank::Disk) => alike && !f.flat.same_disk(&g.flat),
                 // Flush on an opaque wall.
                 (Rank::Light | Rank::Disk, _) => both_opaque,
                 // One stands on the other, or they are parts of one object.
@@ -165,73 +136,11 @@ fn both_but_one_opaque(a: &Thing, b: &Thing) -> bool {
     a.dielectric != b.dielectric
 }
 
-/// Whether two faces lie in one plane, and over each other, `within` this fraction of their size.
-fn coplanar(f: &Face, g: &Face, within: f64) -> bool {
-    if f.normal.cross(g.normal).length() > within {
-        return false;
-    }
-    let (small, large) = if f.radius <= g.radius { (f, g) } else { (g, f) };
-    let between = small.center - large.center;
-    let size = if small.radius.is_finite() {
-        small.radius
-    } else {
-        // Two planes: what they are distant from the file's origin is their only size.
-        let offset = |f: &Face| f.normal.dot(f.center).abs();
-        offset(f).max(offset(g))
-    };
-    let apart = large.normal.dot(between);
-    let aside = (between - large.normal * apart).length();
-    let touching = f.radius + g.radius - within * size;
-    apart.abs() <= within * size && (aside < touching || large.radius.is_infinite())
-}
-
-fn same_disk(f: &Face, g: &Face) -> bool {
-    let near = COINCIDENT * f.radius;
-    (f.radius - g.radius).abs() <= near && f.center.distance(g.center) <= near
-}
-
-/// Whether two cylinders that coincide are as long as each other, so that one is never met; spheres
+/// Whether two shapes whose curved surfaces coincide are as long as each other, so that a ray never meets one of them. Spheres
 /// always are.
-fn same_size(s: &Shape, t: &Shape) -> bool {
-    let length = |shape: &Shape| match *shape {
-        Shape::Cylinder { base, top, .. } => base.distance(top),
-        _ => 0.0,
-    };
-    (length(s) - length(t)).abs() <= COINCIDENT * length(s)
-}
-
-/// Spheres, or sides of cylinders, in one place.
-fn curved_surfaces_coincide(s: &Shape, t: &Shape, within: f64) -> bool {
-    match (*s, *t) {
-        (
-            Shape::Sphere { center, radius },
-            Shape::Sphere {
-                center: other,
-                radius: r,
-            },
-        ) => center.distance(other) + (radius - r).abs() <= within * radius,
-        (
-            Shape::Cylinder { base, top, radius },
-            Shape::Cylinder {
-                base: b,
-                top: t,
-                radius: r,
-            },
-        ) => {
-            let near = within * radius;
-            let length = base.distance(top);
-            let axis = (top - base) / length;
-            let along = |p: DVec3| axis.dot(p - base);
-            let beside = |p: DVec3| (p - base - axis * along(p)).length();
-            let (low, high) = (along(b).min(along(t)), along(b).max(along(t)));
-            (radius - r).abs() <= near
-                && beside(b) <= near
-                && beside(t) <= near
-                && low < length - near
-                && high > near
-        }
-        _ => false,
-    }
+fn same_length(s: &Shape, t: &Shape) -> bool {
+    let tubes = s.tube().zip(t.tube());
+    tubes.is_none_or(|(a, b)| a.same_length(&b))
 }
 
 #[cfg(test)]

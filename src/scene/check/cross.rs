@@ -1,7 +1,8 @@
 //! Dielectric solids whose surfaces cross: the medium inside both is undefined. Solids may nest, touch, or be apart.
 
 use super::geometry::{farthest_on_cylinder, points_on_disk, signed_distance, size};
-use super::{COINCIDENT, Warnings, called, is_dielectric};
+use super::{Warnings, called, is_dielectric};
+use crate::coincidence::{COINCIDENT, parallel, slack};
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
 
@@ -29,10 +30,10 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
 
 /// Whether the surfaces cross, deeper than coincidence.
 fn cross(a: &Shape, b: &Shape) -> bool {
-    let slack = COINCIDENT * size(a).min(size(b));
+    let slack = slack(size(a).min(size(b)));
     match (*a, *b) {
         (Shape::Plane { normal: n, .. }, Shape::Plane { normal: m, .. }) => {
-            n.cross(m).length() > COINCIDENT
+            !parallel(n, m, COINCIDENT)
         }
         (Shape::Plane { .. }, _) => cross(b, a),
         (Shape::Sphere { center, radius }, Shape::Plane { .. }) => {

@@ -1,7 +1,8 @@
 //! Where the eye is: in a solid, on a surface, on a light.
 
 use super::geometry::{disk_of, signed_distance, size};
-use super::{COINCIDENT, Warnings, called};
+use super::{Warnings, called};
+use crate::coincidence;
 use crate::scene::{Bsdf, Scene, Shape};
 
 /// Just before a light, in its radii: where its light begins.
@@ -12,7 +13,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     let eye = scene.camera.eye;
     let view = eye.distance(scene.camera.look_at);
     let touches =
-        |shape: &Shape| signed_distance(shape, eye).abs() <= COINCIDENT * size(shape).min(view);
+        |shape: &Shape| coincidence::touches(signed_distance(shape, eye), size(shape).min(view));
     let mut warnings = Warnings::default();
     for l in scene.lights.iter().filter(|l| touches(&disk_of(l))) {
         warnings.add(l.place(), || {

@@ -1,7 +1,8 @@
 //! Lights that contribute nothing to the picture.
 
 use super::geometry::{disk_of, hit, points_on_disk, signed_distance};
-use super::{COINCIDENT, Warnings, called, is_dielectric};
+use super::{Warnings, called, is_dielectric};
+use crate::coincidence::{COINCIDENT, in_plane, slack};
 use crate::scene::{Light, Primitive, Scene, Shape};
 use glam::DVec3;
 
@@ -33,7 +34,7 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
     for l in &scene.lights {
         // Off the light itself and off what it is flush on: whether that is before or behind is
         // no matter of distance.
-        let start = 2.0 * COINCIDENT * l.radius;
+        let start = 2.0 * slack(l.radius);
         let reach = COVER * l.radius;
         let is_covered = |shape: &Shape| {
             if signed_distance(shape, l.center).abs() > l.radius + reach {
@@ -85,7 +86,7 @@ pub(super) fn unseen(scene: &Scene) -> Warnings {
 
 /// How an opaque shape keeps all light of `l` from the eye for certain, to precede its name.
 fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
-    let slack = COINCIDENT * l.radius;
+    let slack = slack(l.radius);
     match *shape {
         Shape::Plane { point, normal } => {
             let side = normal.dot(eye - point).signum();
@@ -94,7 +95,7 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
             let tilt = normal.cross(l.normal).length();
             if height + l.radius * tilt < -slack {
                 Some("is hidden from the eye behind")
-            } else if height.abs() <= slack && tilt <= COINCIDENT && normal.dot(l.normal) < 0.0 {
+            } else if flush(normal, l, height) && normal.dot(l.normal) < 0.0 {
                 Some("lies on and faces into")
             } else {
                 None
@@ -119,6 +120,11 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
     }
 }
 
+/// Whether the light lies in the plane with this normal, over which its center is at this height.
+fn flush(normal: DVec3, l: &Light, height: f64) -> bool {
+    in_plane([normal, l.normal], height, l.radius, COINCIDENT)
+}
+
 /// Whether the light lies on a cap with its front to the cylinder's inside.
 fn faces_into_cap(shape: &Shape, l: &Light, slack: f64) -> bool {
     let Shape::Cylinder { base, top, radius } = *shape else {
@@ -129,8 +135,7 @@ fn faces_into_cap(shape: &Shape, l: &Light, slack: f64) -> bool {
         let between = l.center - cap;
         let apart = outward.dot(between);
         let aside = (between - outward * apart).length();
-        apart.abs() <= slack
-            && outward.cross(l.normal).length() <= COINCIDENT
+        flush(outward, l, apart)
             && outward.dot(l.normal) < 0.0
             && aside + l.radius <= radius + slack
     })

@@ -1,6 +1,6 @@
 //! Planes n·p = offset: infinite ones, and those that disks, lights and caps lie in.
 
-use super::tracer::Ray;
+use super::Ray;
 use glam::DVec3;
 
 /// Distance, of either sign, along `ray` to the plane of face `face`; exactly 0 when the ray starts on that

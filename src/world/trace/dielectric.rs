@@ -1,6 +1,7 @@
 //! Smooth boundaries of dielectrics: the unpolarised Fresnel equations and Snell's law.
 
 use super::mirror::reflect;
+use crate::world::WorldPrimitive;
 use glam::DVec3;
 
 /// What a boundary does with light at one angle.
@@ -10,6 +11,32 @@ pub struct Fresnel {
     pub transmittance: f64,
     /// Cosine between the refracted ray and the normal; 0 at and beyond the critical angle.
     pub cos_transmitted: f64,
+}
+
+/// The boundary of a dielectric solid, seen from the side that a ray comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Boundary {
+    /// Index of refraction beyond the boundary, divided by the index on the ray's side.
+    pub eta: f64,
+    /// The medium beyond.
+    pub beyond: u32,
+}
+
+impl Boundary {
+    /// The boundary of `solid`, whose index is `ior` times that of what surrounds it, for a ray in `medium`.
+    pub fn new(solid: &WorldPrimitive, ior: f64, medium: u32) -> Self {
+        if medium == solid.solid {
+            Self {
+                eta: 1.0 / ior,
+                beyond: solid.parent,
+            }
+        } else {
+            Self {
+                eta: ior,
+                beyond: solid.solid,
+            }
+        }
+    }
 }
 
 /// `cosine` in 0..=1 of the angle of incidence; `eta` is the index beyond the boundary divided by the index on

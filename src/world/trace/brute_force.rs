@@ -1,8 +1,8 @@
 //! Ray against convex solid by search and bisection on a distance-like function, for the unit tests beside this
 //! file.
 
-use super::sampler::Sampler;
-use super::tracer::Ray;
+use super::Ray;
+use crate::reference::sampler::Sampler;
 use glam::DVec3;
 
 /// Half the length of ray that is searched.
@@ -59,5 +59,5 @@ pub fn random_point(rng: &mut Sampler, half: f64) -> DVec3 {
 /// Uniform on the sphere.
 pub fn random_direction(rng: &mut Sampler) -> DVec3 {
     let z = 2.0 * rng.uniform() - 1.0;
-    super::frame::direction_about(DVec3::Y, z, (1.0 - z * z).sqrt(), rng.uniform())
+    crate::reference::frame::direction_about(DVec3::Y, z, (1.0 - z * z).sqrt(), rng.uniform())
 }

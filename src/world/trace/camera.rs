@@ -1,6 +1,6 @@
 //! The pinhole camera.
 
-use super::tracer::Ray;
+use super::Ray;
 use crate::world::WorldCamera;
 
 /// The ray through film position (`x`, `y`), in pixels from the top left corner of a picture of `size`.

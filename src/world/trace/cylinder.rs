@@ -1,7 +1,7 @@
 //! Solid cylinders: the interval of the side cut with the interval of the caps, so that the rim has no gap.
 
+use super::Ray;
 use super::plane;
-use super::tracer::Ray;
 use glam::DVec3;
 
 /// Rays whose squared sine with the axis is below this never reach the side within any scene: at 10⁻¹² rad it
@@ -127,8 +127,8 @@ impl Cylinder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::brute_force::{self, random_direction, random_point};
     use crate::reference::sampler::Sampler;
+    use crate::world::trace::brute_force::{self, random_direction, random_point};
 
     fn upright(radius: f64, height: f64) -> Cylinder {
         Cylinder {

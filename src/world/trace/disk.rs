@@ -1,7 +1,7 @@
 //! Flat disks; lights use them too.
 
+use super::Ray;
 use super::plane;
-use super::tracer::Ray;
 use glam::DVec3;
 
 /// Distance > 0 to the disk, from either side; `None` for a ray that starts in its plane.

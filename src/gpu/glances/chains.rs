@@ -1,56 +1,55 @@
-//! What mirrors and glass show of lights: rays followed in f64 from points about each pixel.
+//! Pixels that may show a light by way of mirrors and glass.
+//!
+//! Exact rays go through points in and around every pixel, and follow a chain of mirrors and glass until they meet something else.
+//! If they do not all meet the same thing, the pixel shows an edge.
 
-use super::seen::around;
+use super::{FilmBox, Mark};
 use crate::film::coverage::Rect;
-use crate::kernel::BRANCH_SHIFT;
-use crate::reference::camera::camera_ray;
-use crate::reference::{Estimator, Hit, Met, Ray, Tracer};
 use crate::scene::Bsdf;
-use crate::settings::Settings;
+use crate::world::trace::{Hit, Met, Ray, camera_ray};
 use crate::world::{Geometry, World};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
-/// Vertices at which a ray that refracts wherever it can may be reflected instead.
-const TURNS: usize = 3;
+/// A ray refracts wherever it can. Other rays are reflected once instead, at one of this many first vertices.
+const MAX_BRANCHES: usize = 3;
 
-/// Pictures narrower than this are looked at between the corners of pixels too: images in them are small.
+/// Pictures narrower than this get points between the corners of pixels too, because images of lights are small there.
 const FINE_WIDTH: u32 = 384;
 
-/// The most parts of a pixel's side that are looked at.
-const FINEST: u32 = 4;
+/// The largest number of points along the side of a pixel.
+const MAX_FINE: u32 = 4;
 
 /// The light that a ray reaches by way of mirrors and glass.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Reached {
-    /// 1 + its number; 0: none.
+    /// 1 + the light's number; 0: none.
     light: u16,
-    /// Number of its vertex.
-    depth: u8,
+    /// Number of the vertex on the light.
+    vertex: u8,
     /// Whether glass might have sent the ray another way.
     by_chance: bool,
 }
 
-/// What is reached by way of refraction wherever it is possible; and, for each of the first vertices, by reflection there
-/// instead.
-type Sights = [Reached; 1 + TURNS];
+/// What the rays through one point of the film reach. The first one refracts wherever it can; number k, for k >= 1, is reflected
+/// at vertex k.
+type Sights = [Reached; 1 + MAX_BRANCHES];
 
-/// What mirrors and glass show of lights.
-pub(super) struct Shown {
-    tracer: Tracer,
-    /// The last vertex at which lights are looked for.
-    sight: u32,
-    /// Of each mirror and each thing of glass, as [`around`] says.
-    around: Vec<[f64; 4]>,
-    /// Points looked at along the side of a pixel.
+/// The chains of mirrors and glass that a picture may show.
+pub(super) struct Chains {
+    world: World,
+    size: [u32; 2],
+    /// The last vertex at which rays look for lights.
+    last_vertex: u32,
+    /// Pixels that each mirror and each thing of glass may touch.
+    pixels: Vec<FilmBox>,
+    /// Points along the side of a pixel.
     fine: u32,
 }
 
-impl Shown {
-    pub fn new(world: &World, settings: &Settings, sight: u32) -> Self {
-        let [width, height] = settings.size;
-        let all = Some([-2.0, f64::from(width) + 2.0, -2.0, f64::from(height) + 2.0]);
-        let ball = |center, radius| around(&world.camera, settings.size, center, radius);
+impl Chains {
+    pub fn new(world: &World, size: [u32; 2], last_vertex: u32) -> Self {
+        let ball = |center, radius| FilmBox::of_ball(&world.camera, size, center, radius);
         let specular = world.primitives.iter().filter(|p| {
             let bsdf = &world.materials[p.material];
             matches!(bsdf, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. })
@@ -68,41 +67,38 @@ impl Shown {
                 let half = (offsets[1] - offsets[0]) / 2.0;
                 ball(base + axis * half, half.hypot(radius))
             }
-            Geometry::Plane { .. } | Geometry::HugeSphere { .. } => all,
+            Geometry::Plane { .. } | Geometry::HugeSphere { .. } => Some(FilmBox::whole(size)),
         });
         Self {
-            around: bounds.collect(),
-            tracer: Tracer::new(world.clone(), settings.clone(), Estimator::NoLightSampling),
-            sight,
-            fine: FINE_WIDTH.div_ceil(width).clamp(1, FINEST),
+            pixels: bounds.collect(),
+            world: world.clone(),
+            size,
+            last_vertex,
+            fine: FINE_WIDTH.div_ceil(size[0]).clamp(1, MAX_FINE),
         }
     }
 
-    /// What is seen at a place of the film.
-    fn at(&self, x: f64, y: f64) -> Sights {
+    /// What the rays through a point of the film reach.
+    fn sights_at(&self, x: f64, y: f64) -> Sights {
         let mut sights = Sights::default();
-        let mut ray = camera_ray(
-            &self.tracer.world().camera,
-            self.tracer.settings().size,
-            x,
-            y,
-        );
+        let mut ray = camera_ray(&self.world.camera, self.size, x, y);
         let mut by_chance = false;
-        for depth in 1..=self.sight {
-            let Some(hit) = self.tracer.intersect(&ray) else {
+        for vertex in 1..=self.last_vertex {
+            let Some(hit) = self.world.intersect(&ray) else {
                 break;
             };
-            let Some(next) = self.tracer.specular(&hit, &ray, false) else {
-                if depth > 1 {
-                    sights[0] = self.reached(&hit, depth, by_chance);
+            let Some(next) = self.world.specular(&hit, &ray, false) else {
+                if vertex > 1 {
+                    sights[0] = reached(&hit, vertex, by_chance);
                 }
                 break;
             };
             if next.medium != ray.medium {
                 by_chance = true;
-                if let Some(turned) = sights.get_mut(depth as usize) {
-                    let reflected = self.tracer.specular(&hit, &ray, true);
-                    *turned = reflected.map_or(Reached::default(), |ray| self.end(ray, depth + 1));
+                if let Some(branch) = sights.get_mut(vertex as usize) {
+                    let reflected = self.world.specular(&hit, &ray, true);
+                    *branch =
+                        reflected.map_or(Reached::default(), |ray| self.follow(ray, vertex + 1));
                 }
             }
             ray = next;
@@ -110,32 +106,22 @@ impl Shown {
         sights
     }
 
-    /// What a ray reaches that chance has sent towards vertex `depth`.
-    fn end(&self, mut ray: Ray, depth: u32) -> Reached {
-        for depth in depth..=self.sight {
-            let Some(hit) = self.tracer.intersect(&ray) else {
+    /// What a ray reaches that chance has sent towards vertex `next`.
+    fn follow(&self, mut ray: Ray, next: u32) -> Reached {
+        for vertex in next..=self.last_vertex {
+            let Some(hit) = self.world.intersect(&ray) else {
                 break;
             };
-            match self.tracer.specular(&hit, &ray, false) {
+            match self.world.specular(&hit, &ray, false) {
                 Some(next) => ray = next,
-                None => return self.reached(&hit, depth, true),
+                None => return reached(&hit, vertex, true),
             }
         }
         Reached::default()
     }
 
-    fn reached(&self, hit: &Hit, depth: u32, by_chance: bool) -> Reached {
-        match hit.met {
-            Met::Light { index, front: true } => Reached {
-                light: index as u16 + 1,
-                depth: depth as u8,
-                by_chance,
-            },
-            _ => Reached::default(),
-        }
-    }
-
-    /// What is seen at the points `columns` x `rows` of the lattice, in rows: `look` says it where a mirror may be.
+    /// The sights at the points `columns` x `rows` of a lattice, in rows, whose points lie `step` points of the finest lattice
+    /// apart. `look` finds them where a mirror or glass may be; elsewhere there are none.
     fn grid(
         &self,
         columns: &RangeInclusive<i64>,
@@ -151,11 +137,11 @@ impl Shown {
         rows.for_each(|(row, sights)| {
             let j = first + row as i64;
             let [_, y] = self.place(0, step * j);
-            let boxes = self
-                .around
-                .iter()
-                .filter(|[_, _, y0, y1]| (*y0..=*y1).contains(&y));
-            let boxes: Vec<_> = boxes.map(|[x0, x1, ..]| *x0..=*x1).collect();
+            let boxes = self.pixels.iter();
+            let boxes: Vec<_> = boxes
+                .filter(|b| (b.min_y..=b.max_y).contains(&y))
+                .map(|b| b.min_x..=b.max_x)
+                .collect();
             if boxes.is_empty() {
                 return;
             }
@@ -169,15 +155,16 @@ impl Shown {
         sights
     }
 
-    /// Where on the film a point of the lattice lies.
+    /// Where on the film a point of the finest lattice lies.
     fn place(&self, i: i64, j: i64) -> [f64; 2] {
         [i, j].map(|k| k as f64 / f64::from(self.fine))
     }
 
-    /// Marks the pixels of `rect`.
-    pub fn mark(&self, rect: Rect, marks: &mut [u32]) {
+    /// Sets the marks of the pixels of `rect`.
+    pub fn mark(&self, rect: Rect, marks: &mut [Mark]) {
         let fine = i64::from(self.fine);
-        // All points of the pixels and those next to them; of every other row and column as many more as are compared.
+        // The finest lattice has all points of the pixels, and those next to them. The coarse lattice has every other row and
+        // column, and as many more as are compared below.
         let points = |first: u32, end: u32| fine * i64::from(first) - 1..=fine * i64::from(end) + 1;
         let (columns, rows) = (points(rect.x0, rect.x1), points(rect.y0, rect.y1));
         let coarse = |points: &RangeInclusive<i64>| {
@@ -186,7 +173,7 @@ impl Shown {
         let (coarse_columns, coarse_rows) = (coarse(&columns), coarse(&rows));
         let at = |i: i64, j: i64| {
             let [x, y] = self.place(i, j);
-            self.at(x, y)
+            self.sights_at(x, y)
         };
         let few = self.grid(&coarse_columns, &coarse_rows, 2, |i, j| at(2 * i, 2 * j));
         let across = (coarse_columns.end() - coarse_columns.start() + 1) as usize;
@@ -197,7 +184,7 @@ impl Shown {
             if i % 2 == 0 && j % 2 == 0 {
                 return known;
             }
-            // Between points that all show the same nothing else is looked for.
+            // Between coarse points that all show the same, nothing else is looked for.
             let mut around = (y - 1..=y + 2).map(|y| &few[y * across + x - 1..][..4]);
             if around.all(|row| row.iter().all(|s| *s == known)) {
                 known
@@ -221,24 +208,36 @@ impl Shown {
     }
 }
 
-/// The mark of a pixel that has these sights at and about it: see [`SeenLights::marks`](super::seen::SeenLights::marks).
-fn mark_of<'a>(sights: impl Iterator<Item = &'a Sights>) -> u32 {
+/// What a ray that ends at `hit` has reached.
+fn reached(hit: &Hit, vertex: u32, by_chance: bool) -> Reached {
+    match hit.met {
+        Met::Light { index, front: true } => Reached {
+            light: index as u16 + 1,
+            vertex: vertex as u8,
+            by_chance,
+        },
+        _ => Reached::default(),
+    }
+}
+
+/// The mark of a pixel with these sights in and around it.
+fn mark_of<'a>(sights: impl Iterator<Item = &'a Sights>) -> Mark {
     let mut sights = sights.peekable();
     let first = sights.peek().map_or(Sights::default(), |s| **s);
-    let (mut sight, mut branch) = (0, 0);
-    let mut note = |k: usize, reached: &Reached| {
-        sight = sight.max(reached.depth);
-        if k > 0 && (branch == 0 || k < branch) {
-            branch = k;
+    let mut mark = Mark::default();
+    let mut note = |branch: u8, reached: &Reached| {
+        mark.last_vertex = mark.last_vertex.max(reached.vertex);
+        if branch > 0 && (mark.branch_vertex == 0 || branch < mark.branch_vertex) {
+            mark.branch_vertex = branch;
         }
     };
     for sights in sights {
-        for (k, (a, b)) in first.iter().zip(sights).enumerate() {
+        for (branch, (a, b)) in (0..).zip(first.iter().zip(sights)) {
             if a != b || b.by_chance {
-                note(k, a);
-                note(k, b);
+                note(branch, a);
+                note(branch, b);
             }
         }
     }
-    u32::from(sight) | (branch as u32) << BRANCH_SHIFT
+    mark
 }

@@ -1,0 +1,261 @@
+//! Exact rays: what a ray meets in the world, and where a mirror or glass sends it, in f64.
+//!
+//! The reference follows its paths with these functions. The GPU's host uses them to find the pixels in which mirrors and glass
+//! show a light. Each shape has a file of its own, with the name of the shader module that does the same in f32.
+
+pub mod camera;
+pub mod cylinder;
+pub mod dielectric;
+pub mod disk;
+pub mod huge_sphere;
+pub mod mirror;
+pub mod plane;
+pub mod sphere;
+
+#[cfg(test)]
+pub(crate) mod brute_force;
+
+pub use camera::camera_ray;
+
+use super::{AIR, Geometry, Side, World, WorldPrimitive};
+use crate::scene::Bsdf;
+use cylinder::Cylinder;
+use dielectric::Boundary;
+use glam::DVec3;
+use huge_sphere::HugeSphere;
+
+/// A ray with all that its path knows about where it starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Start.
+    pub origin: DVec3,
+    /// Unit direction.
+    pub direction: DVec3,
+    /// The dielectric solid it runs in; [`AIR`] for none.
+    pub medium: u32,
+    /// The face it starts on ([`WorldPrimitive::faces`]); 0 for none.
+    pub face: u32,
+}
+
+impl Ray {
+    /// The point at distance `t`.
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.origin + self.direction * t
+    }
+}
+
+/// What a ray has met.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Met {
+    /// A light, by its index; `front` is the side that emits.
+    Light {
+        /// Index into [`World::lights`].
+        index: usize,
+        /// Whether the ray has come from where the light shines.
+        front: bool,
+    },
+    /// A primitive, by its index into [`World::primitives`].
+    Primitive(usize),
+}
+
+/// Where a ray has met something.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Distance, >= 0.
+    pub t: f64,
+    /// The point, put back on the surface.
+    pub point: DVec3,
+    /// Unit normal, turned to the side that the ray has come from.
+    pub normal: DVec3,
+    /// Identity of the face.
+    pub face: u32,
+    /// What it is.
+    pub met: Met,
+}
+
+impl World {
+    /// The nearest thing met, lights first and then the primitives in the world's order: of several at one
+    /// distance the first counts.
+    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        let mut nearest: Option<Hit> = None;
+        let nearer = |t: f64, nearest: &Option<Hit>| nearest.as_ref().is_none_or(|n| t < n.t);
+        for (index, l) in self.lights.iter().enumerate() {
+            let met = disk::intersect(l.center, l.normal, l.offset, l.radius, l.face, ray);
+            if let Some(t) = met.filter(|&t| nearer(t, &nearest)) {
+                let front = l.normal.dot(ray.direction) < 0.0;
+                nearest = Some(Hit {
+                    t,
+                    point: plane::project(l.normal, l.offset, ray.at(t)),
+                    normal: if front { l.normal } else { -l.normal },
+                    face: l.face,
+                    met: Met::Light { index, front },
+                });
+            }
+        }
+        for (index, p) in self.primitives.iter().enumerate() {
+            let Some(inside) = is_inside(p, ray.medium) else {
+                continue;
+            };
+            let met = meet(p, inside, ray);
+            if let Some((t, face)) = met.filter(|&(t, _)| nearer(t, &nearest)) {
+                let (point, outward) = surface(p, face, ray.at(t));
+                let turn = match p.geometry {
+                    Geometry::Disk { .. } => outward.dot(ray.direction) > 0.0,
+                    _ => inside,
+                };
+                nearest = Some(Hit {
+                    t,
+                    point,
+                    normal: if turn { -outward } else { outward },
+                    face: p.faces[face],
+                    met: Met::Primitive(index),
+                });
+            }
+        }
+        nearest
+    }
+
+    /// Whether something stands between the ray's start and the front of light `light`, at which the ray is
+    /// aimed. A ray that misses the light, or comes from behind it, is occluded too.
+    pub fn occluded(&self, ray: &Ray, light: usize) -> bool {
+        let aimed_at = Met::Light {
+            index: light,
+            front: true,
+        };
+        self.intersect(ray).is_none_or(|hit| hit.met != aimed_at)
+    }
+
+    /// The ray that leaves `hit`, where `ray` has met a mirror or glass. At glass it refracts if it can, or is reflected if
+    /// `reflects`. `None` from other surfaces.
+    pub fn specular(&self, hit: &Hit, ray: &Ray, reflects: bool) -> Option<Ray> {
+        let Met::Primitive(index) = hit.met else {
+            return None;
+        };
+        let p = &self.primitives[index];
+        let (direction, medium) = match self.materials[p.material] {
+            Bsdf::Mirror { .. } => (mirror::reflect(ray.direction, hit.normal), ray.medium),
+            Bsdf::Dielectric { ior, .. } => {
+                let boundary = Boundary::new(p, ior, ray.medium);
+                let u = if reflects { 1.0 } else { 0.0 };
+                let (direction, crossed) =
+                    dielectric::sample(ray.direction, hit.normal, boundary.eta, u);
+                let medium = if crossed { boundary.beyond } else { ray.medium };
+                (direction, medium)
+            }
+            Bsdf::Diffuse { .. } | Bsdf::Phong { .. } => return None,
+        };
+        Some(Ray {
+            origin: hit.point,
+            direction,
+            medium,
+            face: hit.face,
+        })
+    }
+}
+
+/// Whether a ray in `medium` is inside the solid `p`; `None` if it cannot meet `p` at all. Disks have no inside.
+fn is_inside(p: &WorldPrimitive, medium: u32) -> Option<bool> {
+    match p.side {
+        Side::Outside => Some(false),
+        Side::Inside => Some(true),
+        Side::Both if p.solid == AIR => Some(false),
+        Side::Both if p.solid == medium => Some(true),
+        Side::Both if p.parent == medium => Some(false),
+        Side::Both => None,
+    }
+}
+
+/// Distance to `p` for a ray inside or outside it, and which of its faces is met.
+fn meet(p: &WorldPrimitive, inside: bool, ray: &Ray) -> Option<(f64, usize)> {
+    let on_it = ray.face == p.faces[0];
+    match p.geometry {
+        Geometry::Disk {
+            center,
+            normal,
+            offset,
+            radius,
+        } => disk::intersect(center, normal, offset, radius, p.faces[0], ray).map(|t| (t, 0)),
+        Geometry::Plane { normal, offset } => {
+            plane::intersect(normal, offset, p.faces[0], inside, ray).map(|t| (t, 0))
+        }
+        Geometry::Sphere { center, radius } => {
+            if inside {
+                Some((sphere::leave(center, radius, on_it, ray), 0))
+            } else if on_it {
+                None
+            } else {
+                sphere::enter(center, radius, ray).map(|t| (t, 0))
+            }
+        }
+        Geometry::HugeSphere {
+            pole,
+            normal,
+            radius,
+        } => {
+            let huge = HugeSphere {
+                pole,
+                normal,
+                radius,
+            };
+            if inside {
+                Some((huge.leave(on_it, ray), 0))
+            } else if on_it {
+                None
+            } else {
+                huge.enter(ray).map(|t| (t, 0))
+            }
+        }
+        Geometry::Cylinder {
+            base,
+            axis,
+            offsets,
+            radius,
+        } => {
+            let solid = Cylinder {
+                base,
+                axis,
+                offsets,
+                radius,
+                faces: p.faces,
+            };
+            if inside {
+                Some(solid.leave(ray))
+            } else {
+                solid.enter(ray)
+            }
+        }
+    }
+}
+
+/// `point` put back on face number `face` of `p`, and the outward unit normal there.
+fn surface(p: &WorldPrimitive, face: usize, point: DVec3) -> (DVec3, DVec3) {
+    match p.geometry {
+        Geometry::Disk { normal, offset, .. } | Geometry::Plane { normal, offset } => {
+            (plane::project(normal, offset, point), normal)
+        }
+        Geometry::Sphere { center, radius } => sphere::project(center, radius, point),
+        Geometry::HugeSphere {
+            pole,
+            normal,
+            radius,
+        } => HugeSphere {
+            pole,
+            normal,
+            radius,
+        }
+        .project(point),
+        Geometry::Cylinder {
+            base,
+            axis,
+            offsets,
+            radius,
+        } => Cylinder {
+            base,
+            axis,
+            offsets,
+            radius,
+            faces: p.faces,
+        }
+        .project(face, point),
+    }
+}
