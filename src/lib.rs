@@ -11,6 +11,7 @@ pub mod bench;
 pub mod cli;
 pub mod compare;
 pub mod engine;
+pub mod files;
 pub mod film;
 pub mod gpu;
 pub mod kernel;

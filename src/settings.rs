@@ -1,12 +1,7 @@
 //! Everything besides the scene that decides what is rendered: flags over the file's hints over defaults.
 
-use crate::scene::Scene;
+use crate::scene::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Scene};
 use serde::{Deserialize, Serialize};
-
-/// Path vertices after the eye when neither file nor flag says.
-pub const DEFAULT_MAX_DEPTH: u32 = 64;
-/// Strata a side when neither file nor flag says: the report's 2 x 2.
-pub const DEFAULT_STRATA: u32 = 2;
 
 /// How light travels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! The JSON Schema of scene files against the parser: what it accepts and what it rejects.
 
-use etendue::scene::hash::scene_hash;
+use etendue::provenance::hash::scene_hash;
 use etendue::scene::parse::parse_str;
 use etendue::scene::schema::schema;
 use etendue::settings::{Overrides, Settings};

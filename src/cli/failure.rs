@@ -1,7 +1,7 @@
 //! Why a command ends without success, and the exit status that says so.
 
 use crate::engine::EngineError;
-use crate::output::FileError;
+use crate::files::FileError;
 use crate::scene::Diagnostic;
 use crate::scene::parse::ReadError;
 

@@ -5,9 +5,9 @@ use super::failure::Failure;
 use super::files::Files;
 use super::progress::Progress;
 use super::{memory, plan, say};
+use crate::files::FileError;
 use crate::film::merge::{HoleKind, MergeError, holes, merge as add};
-use crate::film::store::{self, Outline};
-use crate::output::FileError;
+use crate::output::store::{self, Outline};
 use std::path::{Path, PathBuf};
 
 /// Holes that are listed; more would hide the rest.

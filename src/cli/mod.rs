@@ -24,7 +24,7 @@ mod signals;
 mod stages;
 mod values;
 
-use crate::output::FileError;
+use crate::files::FileError;
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;

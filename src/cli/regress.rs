@@ -8,7 +8,7 @@ use super::signals::Signals;
 use super::{backend, memory, say, write_stdout};
 use crate::compare::Limits;
 use crate::engine::Engine;
-use crate::output::{FileError, atomic};
+use crate::files::{FileError, atomic};
 use crate::regress::report::{self, Done};
 use crate::regress::{Case, Outcome, Trouble, Wanted, bless, cases};
 use crate::scene::parse;

@@ -3,8 +3,10 @@
 use super::args::RenderArgs;
 use super::progress::Progress;
 use crate::engine::DeviceInfo;
-use crate::film::{Film, store};
-use crate::output::{FileError, write_png};
+use crate::files::FileError;
+use crate::film::Film;
+use crate::output::store;
+use crate::output::write_png;
 use crate::provenance::Provenance;
 use crate::run::{self, Tally};
 use std::time::{Duration, Instant};

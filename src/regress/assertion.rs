@@ -1,8 +1,9 @@
 //! The verdict as an assertion, for tests.
 
 use crate::compare::{Limits, Picture, compare, html};
+use crate::files::atomic;
 use crate::film::Film;
-use crate::output::{atomic, write_exr};
+use crate::output::write_exr;
 use crate::provenance::Provenance;
 use std::io::Write;
 use std::path::Path;

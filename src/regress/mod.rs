@@ -13,9 +13,10 @@ pub use golden::{Bless, Wanted, bless};
 
 use crate::compare::{Comparison, Limits, Picture, compare, html};
 use crate::engine::Engine;
+use crate::files::{FileError, atomic};
+use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::{Film, store};
-use crate::output::{FileError, atomic};
+use crate::output::store;
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason};
 use crate::scene::parse;

@@ -10,7 +10,7 @@ mod open;
 pub(super) use coincide::may_coincide;
 
 use super::source::quoted;
-use super::{Bsdf, Diagnostic, Place, Primitive, Scene};
+use super::{Bsdf, COINCIDENT, Diagnostic, Place, Primitive, Scene};
 use glam::DVec3;
 
 /// Scenes with more primitives and lights than this are not searched for things that go wrong
@@ -19,9 +19,6 @@ pub const MAX_PAIRWISE: usize = 2000;
 
 /// Warnings of one kind that are written out; the rest are counted.
 pub const MAX_ALIKE: usize = 10;
-
-/// Surfaces closer than this, relative to their size, coincide.
-const COINCIDENT: f64 = crate::world::COINCIDENT;
 
 /// Warnings of one kind.
 #[derive(Default)]

@@ -6,7 +6,6 @@
 pub mod check;
 mod format;
 pub mod generate;
-pub mod hash;
 mod order;
 pub mod parse;
 mod reader;
@@ -22,6 +21,15 @@ pub use value::LARGEST_STRATA;
 use glam::DVec3;
 use std::fmt;
 use std::path::PathBuf;
+
+/// Path vertices after the eye when neither file nor flag says.
+pub const DEFAULT_MAX_DEPTH: u32 = 64;
+
+/// Strata a side when neither file nor flag says: the report's 2 x 2.
+pub const DEFAULT_STRATA: u32 = 2;
+
+/// Surfaces closer than this, relative to their size, coincide.
+pub const COINCIDENT: f64 = 1e-6;
 
 /// A whole scene file. Every value has passed the format's rules.
 #[derive(Debug, Clone, PartialEq)]

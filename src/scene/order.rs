@@ -212,7 +212,7 @@ impl Groups {
 /// A ball that meets that of every other shape of the kind with which this one may coincide.
 fn place(shape: &Shape) -> (DVec3, f64) {
     // Ten times the tolerance: what coincides with one thing may coincide with another through it.
-    const SLACK: f64 = 10.0 * crate::world::COINCIDENT;
+    const SLACK: f64 = 10.0 * super::COINCIDENT;
     let (center, reach) = match *shape {
         Shape::Sphere { center, radius } => (center, SLACK * radius),
         // The point nearest the file's origin is the same for either direction of the normal.

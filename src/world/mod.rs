@@ -21,6 +21,7 @@ mod media;
 mod origin;
 mod tree;
 
+pub use crate::scene::COINCIDENT;
 pub use geometry::Geometry;
 pub use tree::{Bounds, Node, Tree};
 
@@ -30,9 +31,6 @@ use media::Media;
 
 /// The medium outside every dielectric solid.
 pub const AIR: u32 = 0;
-
-/// Surfaces closer than this, relative to their size, coincide.
-pub const COINCIDENT: f64 = 1e-6;
 
 /// Where rays can be, seen from a primitive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

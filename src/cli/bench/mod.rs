@@ -18,8 +18,8 @@ use crate::bench::{
 use crate::engine::EngineError;
 use crate::gpu::Gpu;
 use crate::kernel::Access;
+use crate::provenance::hash::scene_hash;
 use crate::run::Tally;
-use crate::scene::hash::scene_hash;
 use crate::scene::{Scene, parse};
 use crate::settings::Settings;
 use crate::world::World;

@@ -5,7 +5,7 @@
 //! points) are two scenes: the hash may part what is equal, never join what differs. Order in the file counts
 //! among surfaces of one kind that coincide, for there it decides what is met, and nowhere else.
 
-use super::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
+use crate::scene::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
 use crate::settings::{Integrator, LightParts, Settings};
 use glam::DVec3;
 use sha2::{Digest, Sha256};

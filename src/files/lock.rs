@@ -3,7 +3,7 @@
 //! While a render holds a film, a file beside it is locked. The lock is the system's and ends with the process, however that
 //! ends: what is left of a killed one is a file that nobody holds.
 
-use crate::output::FileError;
+use crate::files::FileError;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 //! A process that is killed leaves its temporary file behind. It holds a lock on it while it lives,
 //! so the next one to write the same name can tell such leftovers from work in progress and removes them.
 
-use super::error::FileError;
+use super::FileError;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
