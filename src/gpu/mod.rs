@@ -3,6 +3,7 @@
 mod adapters;
 mod engine;
 mod held;
+mod instance;
 pub mod pack;
 pub mod probe;
 #[cfg(test)]
