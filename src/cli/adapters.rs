@@ -31,7 +31,10 @@ pub fn adapters() -> Result<(), Failure> {
     };
     super::write_stdout(&text)?;
     if !taken {
-        super::say!("for a software adapter: {}", super::backend::GET_ADAPTER);
+        super::say!(
+            "for a software adapter: {}",
+            crate::render::backend::GET_ADAPTER
+        );
     }
     Ok(())
 }

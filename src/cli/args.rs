@@ -127,16 +127,7 @@ pub enum ProgressStyle {
     None,
 }
 
-/// `--backend`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Backend {
-    /// A real GPU, else a software adapter, else the CPU reference.
-    Auto,
-    /// Any adapter.
-    Gpu,
-    /// The f64 reference.
-    Cpu,
-}
+pub use crate::render::Backend;
 
 /// `etendue check`.
 #[derive(Debug, Args)]

@@ -2,7 +2,6 @@
 
 mod adapters;
 mod args;
-mod backend;
 mod bench;
 mod check;
 mod compare;
@@ -11,7 +10,6 @@ mod drivers;
 mod failure;
 mod files;
 mod make_scene;
-mod memory;
 mod merge;
 mod plan;
 mod progress;

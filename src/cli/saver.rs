@@ -8,6 +8,7 @@ use crate::film::Film;
 use crate::output::store;
 use crate::output::write_png;
 use crate::provenance::Provenance;
+use crate::render;
 use crate::run::{self, Tally};
 use std::time::{Duration, Instant};
 
@@ -44,10 +45,7 @@ impl<'a> Saver<'a> {
 
     /// The film's provenance, this run included.
     pub fn provenance(&self, film: &Film, tally: &Tally) -> Provenance {
-        let mut provenance = self.before.clone();
-        provenance.add_work(self.device, tally.counters, tally.seconds);
-        provenance.describe(film);
-        provenance
+        render::provenance(self.before, self.device, film, tally)
     }
 
     /// Writes what is due. A file that can't be written now is warned of, not fatal: hours of rendering

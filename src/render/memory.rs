@@ -1,6 +1,6 @@
 //! Whether a picture fits into memory, asked before anything is allocated.
 
-use super::failure::Failure;
+use super::Error;
 use crate::engine::MAX_TILE_PIXELS;
 use std::fs;
 
@@ -21,9 +21,9 @@ fn needed(pixels: u64) -> u64 {
 }
 
 /// Refuses a picture part of `pixels` pixels that memory cannot hold, with the numbers.
-pub fn check(pixels: u64) -> Result<(), Failure> {
+pub fn check(pixels: u64) -> Result<(), Error> {
     match available() {
-        Some(have) if needed(pixels) > have => Err(Failure::Input(format!(
+        Some(have) if needed(pixels) > have => Err(Error::Input(format!(
             "a film of {:.1} million pixels takes {:.1} GB and {:.1} GB are free: render a smaller --size, or \
                  a --region at a time",
             pixels as f64 / 1e6,

@@ -3,6 +3,7 @@
 //! [`parse`] reads it from TOML, [`schema`] describes that TOML to editors, [`check`] finds what is
 //! legal but suspect, and [`World::new`](crate::world::World::new) makes it ready for rays.
 
+mod build;
 pub mod check;
 mod format;
 pub mod generate;
@@ -14,13 +15,15 @@ pub mod schema;
 mod source;
 mod value;
 
+pub(crate) use build::checked;
+pub use build::{Invalid, SceneBuilder};
 pub use order::Canonical;
 pub use rows::MAX_ROWS_BYTES;
-pub use value::LARGEST_STRATA;
+pub use value::{LARGEST_RESOLUTION, LARGEST_STRATA};
 
 use glam::DVec3;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Path vertices after the eye when neither file nor flag says.
 pub const DEFAULT_MAX_DEPTH: u32 = 64;
@@ -50,6 +53,23 @@ pub struct Scene {
     pub primitives: Vec<Primitive>,
     /// Disk lights in file order, those from files of rows last; at least one.
     pub lights: Vec<Light>,
+}
+
+impl Scene {
+    /// Begins a scene that is built in code.
+    pub fn builder() -> SceneBuilder {
+        SceneBuilder::default()
+    }
+
+    /// The scene in a file, and in the files of rows that it names.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, parse::ReadError> {
+        parse::read(path.as_ref())
+    }
+
+    /// The scene in the text of a scene file. Files of rows that it names lie relative to the working directory.
+    pub fn parse(text: &str) -> Result<Self, Invalid> {
+        parse::parse_str(Path::new("scene"), text).map_err(Invalid)
+    }
 }
 
 /// Pinhole camera. `up` is not parallel to the view.

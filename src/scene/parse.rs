@@ -37,7 +37,7 @@ pub enum ReadError {
     Invalid(Vec<Diagnostic>),
 }
 
-fn one_a_line(diagnostics: &[Diagnostic]) -> String {
+pub(super) fn one_a_line(diagnostics: &[Diagnostic]) -> String {
     let lines: Vec<String> = diagnostics.iter().map(Diagnostic::to_string).collect();
     lines.join("\n")
 }
