@@ -6,9 +6,11 @@
 
 mod assertion;
 mod golden;
+#[doc(hidden)]
 pub mod report;
 
 pub use assertion::{BLESS, assert_golden};
+#[doc(hidden)]
 pub use golden::{Bless, Wanted, bless};
 
 use crate::compare::{Comparison, Limits, Picture, compare, html};
@@ -27,10 +29,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Makes an engine for a scene, and says how many pixels to give it at once.
+#[doc(hidden)]
 pub type MakeEngine<'a> =
     dyn Fn(&World, &Settings) -> Result<(Box<dyn Engine>, u64), Trouble> + Sync + 'a;
 
 /// Why there is nothing to judge.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Trouble {
     /// The scene or the golden can't be used; why.
@@ -55,6 +59,7 @@ impl From<Trouble> for Outcome {
 }
 
 /// A scene, a golden picture, or both, under one name.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Case {
     /// The files' stem.
@@ -68,6 +73,7 @@ pub struct Case {
 }
 
 /// What became of a case.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// The same up to its noise.
@@ -280,6 +286,7 @@ fn render(
 }
 
 /// The scenes of `dir` and the goldens of `dir/golden` whose name contains `filter`, by name.
+#[doc(hidden)]
 pub fn cases(dir: &Path, filter: &str) -> Result<Vec<Case>, FileError> {
     let scenes = stems(dir, "toml")?;
     let golden = dir.join("golden");

@@ -17,7 +17,9 @@ use crate::film::pilot::Pilot;
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::parse::ReadError;
-use crate::scene::{self, Canonical, Diagnostic, Invalid, LARGEST_STRATA, Scene};
+use crate::scene::{
+    self, Canonical, Diagnostic, Invalid, LARGEST_RESOLUTION, LARGEST_STRATA, Scene,
+};
 use crate::settings::{Integrator, LightParts, Overrides, Settings};
 use crate::world::World;
 use std::ops::ControlFlow;
@@ -30,6 +32,9 @@ pub const DEFAULT_SPP: u64 = 256;
 
 /// The most samples that a pixel can have: they are numbered in 32 bits.
 pub const MAX_SAMPLES: u64 = u32::MAX as u64;
+
+/// The most light samples at a vertex.
+pub const MAX_SHADOW_RAYS: u32 = 1024;
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]
@@ -110,9 +115,6 @@ pub struct Options {
     pub integrator: Option<Integrator>,
 }
 
-/// The sides of pictures in pixels.
-const SIDES: std::ops::RangeInclusive<u32> = 1..=scene::LARGEST_RESOLUTION;
-
 impl Options {
     /// Refuses values that no picture can have.
     fn check(&self) -> Result<(), Error> {
@@ -122,14 +124,9 @@ impl Options {
             ))),
             _ => Ok(()),
         };
-        let size = self.size.iter().flatten();
-        for side in size {
-            within(
-                "a side of size",
-                Some(u64::from(*side)),
-                1,
-                (*SIDES.end()).into(),
-            )?;
+        for side in self.size.iter().flatten() {
+            let side = Some(u64::from(*side));
+            within("a side of size", side, 1, LARGEST_RESOLUTION.into())?;
         }
         within("spp", self.spp, 1, MAX_SAMPLES)?;
         within(
@@ -197,9 +194,6 @@ impl Options {
         Ok(self.regions.clone())
     }
 }
-
-/// The most light samples at a vertex.
-pub const MAX_SHADOW_RAYS: u32 = 1024;
 
 /// How far a rendering has come.
 #[derive(Debug, Clone, Copy)]

@@ -6,6 +6,7 @@
 mod build;
 pub mod check;
 mod format;
+#[doc(hidden)]
 pub mod generate;
 mod order;
 pub mod parse;
@@ -17,6 +18,7 @@ mod value;
 
 pub(crate) use build::checked;
 pub use build::{Invalid, SceneBuilder};
+#[doc(hidden)]
 pub use order::Canonical;
 pub use rows::MAX_ROWS_BYTES;
 pub use value::{LARGEST_RESOLUTION, LARGEST_STRATA};
