@@ -5,9 +5,10 @@
 use divan::{Bencher, black_box};
 use etendue::engine::DeviceInfo;
 use etendue::film::coverage::Rect;
-use etendue::film::{BLOCK, Film, REPLICATES, Sums, store};
+use etendue::film::{BLOCK, Film, REPLICATES, Sums};
 use etendue::gpu::pack::pack;
 use etendue::kernel::{Access, compose};
+use etendue::output::store;
 use etendue::output::{write_exr, write_png};
 use etendue::provenance::Provenance;
 use etendue::scene::{Scene, parse};

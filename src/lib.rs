@@ -1,27 +1,86 @@
 //! etendue: a GPU path tracer for analytic scenes that reports the error of every picture.
 //!
+//! A [`Scene`] is read from a file or [built in code](Scene::builder), and [`render`] makes a [`Picture`] of it, on a GPU or
+//! on the CPU reference: radiance, its standard error, and samples of every pixel, and where it all comes from.
+//!
+//! ```no_run
+//! use etendue::{Options, Scene};
+//!
+//! fn main() -> Result<(), etendue::Error> {
+//!     let scene = Scene::read("scenes/three_materials.toml")?;
+//!     let picture = etendue::render(&scene, &Options { error: Some(0.05), ..Options::default() })?;
+//!     println!("{:?} samples a pixel", picture.provenance().samples);
+//!     picture.save("picture.exr")
+//! }
+//! ```
+//!
+//! The way of the data:
+//!
 //! ```text
 //! scenes/x.toml -> scene::parse -> Scene -> World -> kernel::compose and gpu
 //!               -> dispatches -> Film (f64 on the host) -> pictures, report
 //! ```
 //!
-//! The CPU [`reference`] takes the same [`world::World`] and gives the same [`film::Film`].
+//! The CPU reference takes the same world and gives the same [`Film`].
+//!
+//! # Features
+//!
+//! `cli`, on by default, holds the program `etendue` and all that only it needs: command line, progress bar, plots, signals.
+//! A program that renders with the library alone does without: `default-features = false`.
 
-pub mod bench;
-pub mod cli;
 mod coincidence;
 pub mod compare;
-pub mod engine;
-pub mod film;
-pub mod gpu;
-pub mod kernel;
-pub mod output;
-pub mod provenance;
-pub mod reference;
 pub mod regress;
-pub mod run;
 pub mod scene;
+
+pub use engine::{Counters, DeviceInfo};
+pub use files::FileError;
+pub use film::coverage::Rect;
+pub use film::{Estimate, Film};
+pub use glam::DVec3;
+pub use provenance::{DeviceUse, Provenance};
+pub use render::{
+    Backend, DEFAULT_SPP, Error, MAX_SAMPLES, Options, Picture, Progress, render, render_with,
+};
+pub use run::StopReason;
+pub use scene::{Scene, SceneBuilder};
+pub use settings::{Integrator, LightParts, Settings};
+
+// The parts behind that. They are public for this repository's own tests and benchmarks alone, and no promise: what a program
+// can rely on stands above.
+#[doc(hidden)]
+pub mod engine;
+#[doc(hidden)]
+pub mod files;
+#[doc(hidden)]
+pub mod film;
+#[doc(hidden)]
+pub mod gpu;
+#[doc(hidden)]
+pub mod kernel;
+#[doc(hidden)]
+pub mod output;
+#[doc(hidden)]
+pub mod provenance;
+#[doc(hidden)]
+pub mod reference;
+#[doc(hidden)]
+pub mod render;
+#[doc(hidden)]
+pub mod run;
+#[doc(hidden)]
 pub mod selftest;
+#[doc(hidden)]
 pub mod settings;
+#[doc(hidden)]
 pub mod stats;
+#[doc(hidden)]
 pub mod world;
+
+// The program's own.
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod bench;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;

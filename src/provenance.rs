@@ -1,10 +1,13 @@
 //! Where a film comes from: enough to render it again, and to check which films can be merged with it.
 
+pub mod hash;
+
 use crate::engine::{Counters, DeviceInfo};
 use crate::film::Film;
-use crate::scene::hash::hash_of;
+
 use crate::scene::{Canonical, Scene};
 use crate::settings::{Integrator, LightParts, Settings};
+use hash::hash_of;
 use serde::{Deserialize, Serialize, Serializer};
 
 /// Incremented whenever a change to the program changes the value of any sample.
@@ -21,7 +24,7 @@ pub struct Provenance {
     pub sampler_version: u32,
     /// The scene's title.
     pub scene_title: Option<String>,
-    /// [`scene_hash`](crate::scene::hash::scene_hash) of scene and settings.
+    /// [`scene_hash`](hash::scene_hash) of scene and settings.
     pub scene_hash: String,
     /// The scene file's own text.
     pub scene_text: String,

@@ -1,12 +1,7 @@
 //! The render settings: flags override the scene file, which overrides the defaults.
 
-use crate::scene::Scene;
+use crate::scene::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Scene};
 use serde::{Deserialize, Serialize};
-
-/// Default number of path vertices after the eye.
-pub const DEFAULT_MAX_DEPTH: u32 = 64;
-/// Default number of strata per side: the report's 2 x 2.
-pub const DEFAULT_STRATA: u32 = 2;
 
 /// How light travels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -4,8 +4,9 @@ mod output_support;
 
 use assert_cmd::Command;
 use etendue::compare::flip::{PIXELS_PER_DEGREE, flip};
+use etendue::film::Film;
 use etendue::film::coverage::Rect;
-use etendue::film::{Film, store};
+use etendue::output::store;
 use etendue::output::{read_exr, write_exr, write_png};
 use output_support::{Random, described};
 use predicates::prelude::PredicateBooleanExt;

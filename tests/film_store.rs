@@ -2,10 +2,10 @@
 
 mod output_support;
 
+use etendue::files::FileError;
 use etendue::film::coverage::Rect;
-use etendue::film::store::{load, save};
 use etendue::film::{Film, REPLICATES};
-use etendue::output::FileError;
+use etendue::output::store::{load, save};
 use etendue::provenance::Provenance;
 use output_support::{
     Random, described, forge, forge_bytes, negate_first_count, region_film, render,

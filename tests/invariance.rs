@@ -9,8 +9,8 @@ mod common;
 
 use common::{block_means, cpu, film, gpu, named_scene, settings, worst_t};
 use etendue::kernel::Access;
+use etendue::provenance::hash::scene_hash;
 use etendue::reference::Estimator;
-use etendue::scene::hash::scene_hash;
 use etendue::scene::{Bsdf, Scene, Shape};
 use etendue::selftest::build::{Build, GLASS, MIRROR, cylinder, disk, grey, plane, sphere, v};
 use glam::{DMat3, DVec3};

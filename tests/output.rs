@@ -2,9 +2,10 @@
 
 mod output_support;
 
+use etendue::files::FileError;
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
-use etendue::output::{FileError, Format, read_exr, write_exr, write_png};
+use etendue::output::{Format, read_exr, write_exr, write_png};
 use output_support::{described, region_film, seen_from_python, whole_film};
 use serde_json::json;
 use std::collections::BTreeMap;

@@ -2,8 +2,9 @@
 
 use assert_cmd::Command;
 use etendue::engine::Engine;
+use etendue::film::Film;
 use etendue::film::coverage::Rect;
-use etendue::film::{Film, store};
+use etendue::output::store;
 use etendue::output::{read_exr, write_exr};
 use etendue::provenance::Provenance;
 use etendue::reference::{CpuEngine, Estimator};

@@ -1,6 +1,6 @@
 //! Compares the JSON Schema of scene files with the parser: both must accept and reject the same files.
 
-use etendue::scene::hash::scene_hash;
+use etendue::provenance::hash::scene_hash;
 use etendue::scene::parse::parse_str;
 use etendue::scene::schema::schema;
 use etendue::settings::{Overrides, Settings};

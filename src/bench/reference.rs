@@ -3,9 +3,10 @@
 use super::engines::Contender;
 use super::errors::Truth;
 use crate::compare::Picture;
+use crate::files::FileError;
+use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::{Film, store};
-use crate::output::FileError;
+use crate::output::store;
 use crate::provenance::Provenance;
 use crate::run::{CALL, Job, Run, StopReason, Tally};
 use crate::scene::Scene;

@@ -33,7 +33,7 @@ pub fn adapters() -> Result<(), Failure> {
     if !taken {
         super::say!(
             "help: to install a software adapter: {}",
-            super::backend::GET_ADAPTER
+            crate::render::backend::GET_ADAPTER
         );
     }
     Ok(())

@@ -128,16 +128,7 @@ pub enum ProgressStyle {
     None,
 }
 
-/// `--backend`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Backend {
-    /// A hardware GPU if there is one, else a software adapter, else the CPU reference.
-    Auto,
-    /// Any adapter, hardware or software.
-    Gpu,
-    /// The f64 reference.
-    Cpu,
-}
+pub use crate::render::Backend;
 
 /// `etendue check`.
 #[derive(Debug, Args)]

@@ -6,7 +6,7 @@ use super::files::Files;
 use super::progress::Progress;
 use super::{say, write_stdout};
 use crate::compare::{Limits, Picture, compare as compare_pictures, html};
-use crate::output::atomic;
+use crate::files::atomic;
 use std::io::Write;
 use std::path::Path;
 

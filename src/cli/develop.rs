@@ -4,8 +4,8 @@ use super::args::DevelopArgs;
 use super::failure::Failure;
 use super::files::Files;
 use super::progress::Progress;
-use crate::film::store;
 use crate::output::Format;
+use crate::output::store;
 
 /// Writes the pictures that `render` would have written.
 pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {

@@ -1,7 +1,8 @@
 //! Failures of a command, and their exit statuses.
 
 use crate::engine::EngineError;
-use crate::output::FileError;
+use crate::files::FileError;
+use crate::render::Error;
 use crate::scene::Diagnostic;
 use crate::scene::parse::ReadError;
 
@@ -75,13 +76,20 @@ impl From<EngineError> for Failure {
     }
 }
 
+impl From<Error> for Failure {
+    fn from(e: Error) -> Self {
+        match e {
+            Error::Scene(diagnostics) => Failure::Scene(diagnostics),
+            Error::Input(why) => Failure::Input(why),
+            Error::Device(why) => Failure::Device(why),
+            Error::File(e) => e.into(),
+            Error::Stopped => Failure::Said(130),
+        }
+    }
+}
+
 impl From<ReadError> for Failure {
     fn from(e: ReadError) -> Self {
-        match e {
-            ReadError::Io { path, source } => {
-                FileError::io(&path, "cannot read the scene", &source).into()
-            }
-            ReadError::Invalid(diagnostics) => Failure::Scene(diagnostics),
-        }
+        Error::from(e).into()
     }
 }

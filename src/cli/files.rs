@@ -1,7 +1,7 @@
 //! The files that a command reads and writes. No output may overwrite an input or another output.
 
 use super::failure::Failure;
-use crate::output::{FileError, atomic};
+use crate::files::{FileError, atomic};
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use super::args::{MakeSceneArgs, SceneKind};
 use super::failure::Failure;
 use super::say;
-use crate::output::atomic;
+use crate::files::atomic;
 use crate::scene::generate;
 use std::io::Write as _;
 

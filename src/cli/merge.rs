@@ -4,10 +4,11 @@ use super::args::MergeArgs;
 use super::failure::Failure;
 use super::files::Files;
 use super::progress::Progress;
-use super::{memory, plan, say};
+use super::{plan, say};
+use crate::files::FileError;
 use crate::film::merge::{HoleKind, MergeError, holes, merge as add};
-use crate::film::store::{self, Outline};
-use crate::output::FileError;
+use crate::output::store::{self, Outline};
+use crate::render::memory;
 use std::path::{Path, PathBuf};
 
 /// Most holes that are listed: more would hide the other messages.

@@ -2,7 +2,6 @@
 
 mod adapters;
 mod args;
-mod backend;
 mod bench;
 mod check;
 mod compare;
@@ -11,7 +10,6 @@ mod drivers;
 mod failure;
 mod files;
 mod make_scene;
-mod memory;
 mod merge;
 mod plan;
 mod progress;
@@ -24,7 +22,7 @@ mod signals;
 mod stages;
 mod values;
 
-use crate::output::FileError;
+use crate::files::FileError;
 use args::{Cli, Command};
 use clap::Parser;
 use failure::Failure;

@@ -1,19 +1,26 @@
 //! Plans a render: which pixels, which samples, and when to stop.
 
-use super::args::RenderArgs;
+use super::args::{Backend, RenderArgs};
 use super::failure::Failure;
 use super::progress::{clock, percent};
-use super::values::MAX_SAMPLES;
+use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
-use crate::output::FileError;
+use crate::render::plan::end_for;
+use crate::render::{DEFAULT_SPP, MAX_SAMPLES};
 use crate::scene::Scene;
 use crate::settings::Settings;
 use std::ops::Range;
 use std::path::Path;
 
-/// Samples per pixel when no stop condition is given.
-const DEFAULT_SPP: u64 = 256;
+/// Refuses `--adapter` together with `--backend cpu`.
+pub fn check_flags(backend: Backend, adapter: Option<&str>) -> Result<(), Failure> {
+    if backend == Backend::Cpu && adapter.is_some() {
+        let message = "--adapter can't be used with --backend cpu, which uses no adapter";
+        return Err(Failure::Input(message.into()));
+    }
+    Ok(())
+}
 
 /// The pixels to render: the given regions, or the whole picture. Refuses a region that exceeds the picture.
 pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Failure> {
@@ -30,11 +37,6 @@ pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Fail
         }
     }
     Ok(args.region.clone())
-}
-
-/// The smallest rectangle around all regions. `regions` must not be empty.
-pub fn bounds(regions: &[Rect]) -> Rect {
-    regions[1..].iter().fold(regions[0], |a, b| a.union(b))
 }
 
 /// Refuses regions outside the part of the picture that the film holds.
@@ -108,41 +110,6 @@ fn wanted(args: &RenderArgs, settings: &Settings) -> Result<u64, Failure> {
     })
 }
 
-/// The end of the range from 0 that gives every pixel `wanted` samples, counting those that it already has.
-fn end_for(wanted: u64, regions: &[Rect], held: &Coverage) -> u64 {
-    let regions = Rect::disjoint(regions);
-    let mut end = 0;
-    let mut bare: u64 = regions.iter().map(Rect::area).sum();
-    for (rect, ranges) in held.cells() {
-        let inside = regions.iter().filter_map(|r| r.intersection(&rect));
-        let pixels: u64 = inside.map(|r| r.area()).sum();
-        if pixels > 0 {
-            bare -= pixels;
-            end = end.max(end_for_pixel(wanted, ranges));
-        }
-    }
-    if bare > 0 { wanted } else { end }
-}
-
-/// [`end_for`] for a pixel that holds `ranges` (sorted, disjoint).
-fn end_for_pixel(wanted: u64, ranges: &[Range<u64>]) -> u64 {
-    let held: u64 = ranges.iter().map(|r| r.end - r.start).sum();
-    let mut lacking = wanted.saturating_sub(held);
-    if lacking == 0 {
-        return 0;
-    }
-    let mut at = 0;
-    for r in ranges {
-        let gap = r.start - at;
-        if lacking <= gap {
-            break;
-        }
-        lacking -= gap;
-        at = r.end;
-    }
-    at + lacking
-}
-
 /// The number of primitives and lights, such as `4 surfaces`.
 pub fn things(scene: &Scene) -> String {
     let n = scene.primitives.len() + scene.lights.len();
@@ -187,48 +154,4 @@ pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
         conditions.push(format!("{} of rendering time", clock(time.as_secs_f64())));
     }
     Ok(format!("until {}", conditions.join(", or ")))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn rect(x0: u32, y0: u32, x1: u32, y1: u32) -> Rect {
-        Rect { x0, y0, x1, y1 }
-    }
-
-    #[test]
-    fn samples_in_the_film_count() {
-        let whole = rect(0, 0, 4, 4);
-        let end = |held: &[(u64, u64)], wanted| {
-            let mut c = Coverage::default();
-            for &(a, b) in held {
-                c.add(whole, a..b);
-            }
-            end_for(wanted, &[whole], &c)
-        };
-        assert_eq!(end(&[], 100), 100);
-        assert_eq!(end(&[(0, 40)], 100), 100);
-        assert_eq!(end(&[(512, 1024)], 512), 0);
-        assert_eq!(end(&[(512, 1024)], 600), 88);
-        assert_eq!(end(&[(10, 20), (30, 40)], 35), 25);
-        assert_eq!(end(&[(10, 20)], 10), 0);
-        assert_eq!(end(&[(10, 20), (30, 40)], 45), 45);
-    }
-
-    #[test]
-    fn pixels_without_samples_need_all() {
-        let mut c = Coverage::default();
-        c.add(rect(0, 0, 2, 4), 0..500);
-        assert_eq!(end_for(100, &[rect(0, 0, 4, 4)], &c), 100);
-        assert_eq!(end_for(100, &[rect(0, 0, 2, 2), rect(1, 1, 2, 3)], &c), 0);
-    }
-
-    #[test]
-    fn bounds_hold_all_regions() {
-        assert_eq!(
-            bounds(&[rect(4, 4, 6, 6), rect(1, 5, 2, 9)]),
-            rect(1, 4, 6, 9)
-        );
-    }
 }

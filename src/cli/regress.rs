@@ -5,12 +5,13 @@ use super::failure::Failure;
 use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::signals::Signals;
-use super::{backend, memory, say, write_stdout};
+use super::{plan, say, write_stdout};
 use crate::compare::Limits;
 use crate::engine::Engine;
-use crate::output::{FileError, atomic};
+use crate::files::{FileError, atomic};
 use crate::regress::report::{self, Done};
 use crate::regress::{Case, Outcome, Trouble, Wanted, bless, cases};
+use crate::render::{Error, backend, memory};
 use crate::scene::parse;
 use crate::settings::Settings;
 use crate::world::World;
@@ -22,7 +23,7 @@ use std::time::Instant;
 
 /// Runs every case and lists the results. The exit status is 1 if one differs, 2 if one can't be compared.
 pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
-    backend::check_flags(args.backend, args.adapter.as_deref())?;
+    plan::check_flags(args.backend, args.adapter.as_deref())?;
     super::set_threads(args.talk.threads);
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
@@ -113,7 +114,7 @@ fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
             .and_then(|()| backend::choose(args.backend, adapter, world, settings, |_| ()));
         match chosen {
             Ok(chosen) => Ok((chosen.engine, chosen.tile_pixels)),
-            Err(Failure::Device(why)) => Err(Trouble::Device(why)),
+            Err(Error::Device(why)) => Err(Trouble::Device(why)),
             Err(other) => Err(Trouble::Input(other.to_string())),
         }
     };

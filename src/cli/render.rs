@@ -1,25 +1,28 @@
 //! `etendue render`: renders a scene file to pictures, a film and a report.
 
 use super::args::{Backend, RenderArgs};
-use super::backend::{self, Chosen};
 use super::failure::Failure;
 use super::files::{Files, write_text};
 use super::plan;
 use super::progress::{Progress, clock, percent};
 use super::saver::{Saver, longest_call};
+use super::say;
 use super::signals::Signals;
 use super::stages::Stages;
-use super::{memory, say};
 use crate::engine::{Counters, DeviceInfo};
+use crate::files::FileError;
+use crate::files::lock::Lock;
+use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::lock::Lock;
 use crate::film::pilot::Pilot;
-use crate::film::{Film, store};
 use crate::gpu::Making;
 use crate::kernel;
+use crate::output::Format;
 use crate::output::report::{self, Report, Seconds};
-use crate::output::{FileError, Format};
+use crate::output::store;
 use crate::provenance::Provenance;
+use crate::render::backend::{self, Chosen};
+use crate::render::{self, memory};
 use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::{Canonical, Scene, check, parse};
 use crate::settings::Settings;
@@ -34,7 +37,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     // Check everything that can be checked before the first sample.
     let outputs = outputs(args);
     let mut files = check_files(args, &outputs)?;
-    backend::check_flags(args.backend, args.adapter.as_deref())?;
+    plan::check_flags(args.backend, args.adapter.as_deref())?;
     super::set_threads(args.talk.threads);
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
@@ -59,7 +62,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         settings.seed = provenance.settings.seed;
     }
     let regions = plan::regions(args, &settings)?;
-    let bounds = plan::bounds(&regions);
+    let bounds = render::plan::bounds(&regions);
     let things = plan::things(&scene);
     stages.begin(format!("sorting {things}"));
     let ordered = Canonical::new(&scene);

@@ -3,9 +3,12 @@
 use super::args::RenderArgs;
 use super::progress::Progress;
 use crate::engine::DeviceInfo;
-use crate::film::{Film, store};
-use crate::output::{FileError, write_png};
+use crate::files::FileError;
+use crate::film::Film;
+use crate::output::store;
+use crate::output::write_png;
 use crate::provenance::Provenance;
+use crate::render;
 use crate::run::{self, Tally};
 use std::time::{Duration, Instant};
 
@@ -42,10 +45,7 @@ impl<'a> Saver<'a> {
 
     /// The film's provenance, including this run.
     pub fn provenance(&self, film: &Film, tally: &Tally) -> Provenance {
-        let mut provenance = self.before.clone();
-        provenance.add_work(self.device, tally.counters, tally.seconds);
-        provenance.describe(film);
-        provenance
+        render::provenance(self.before, self.device, film, tally)
     }
 
     /// Writes the files that are due. If one can't be written, prints a warning and goes on: hours of rendering are worth

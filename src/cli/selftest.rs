@@ -4,14 +4,15 @@ use super::args::SelftestArgs;
 use super::failure::Failure;
 use super::progress::{Progress, clock};
 use super::signals::Signals;
-use super::{backend, say};
+use super::{plan, say};
+use crate::render::backend;
 use crate::selftest::{Backend, Case, Measure, Trouble, cases};
 use std::time::Instant;
 
 /// Runs the cases and prints a line for every quantity as soon as its case has run.
 pub fn selftest(args: &SelftestArgs) -> Result<(), Failure> {
     let begun = Instant::now();
-    backend::check_flags(args.backend, args.adapter.as_deref())?;
+    plan::check_flags(args.backend, args.adapter.as_deref())?;
     let chosen = choose_cases(args.filter.as_deref())?;
     super::set_threads(args.talk.threads);
     let signals =

@@ -2,6 +2,7 @@
 //! values that begin with a hyphen, so that -1 gets the rule and is not mistaken for another flag.
 
 use crate::film::coverage::Rect;
+use crate::render::MAX_SAMPLES;
 use crate::settings::LightParts;
 use std::ops::Range;
 use std::time::Duration;
@@ -131,9 +132,6 @@ pub fn limit(text: &str) -> Result<f64, String> {
         _ => Err("expected a number such as 0.02 or 2%, 0 or more".into()),
     }
 }
-
-/// Most samples that a pixel can have: sample numbers have 32 bits.
-pub const MAX_SAMPLES: u64 = u32::MAX as u64;
 
 /// A number of samples, 1..=[`MAX_SAMPLES`].
 pub fn samples(text: &str) -> Result<u64, String> {

@@ -1,8 +1,10 @@
 //! Pictures to compare: EXR files, films, PNG files, and films in memory.
 
-use crate::film::{Film, store};
-use crate::output::error::open;
-use crate::output::{FileError, Pixels, entries, read_exr};
+use crate::files::FileError;
+use crate::files::open;
+use crate::film::Film;
+use crate::output::store;
+use crate::output::{Pixels, entries, read_exr};
 use crate::provenance::Provenance;
 use std::io::{BufReader, Read as _};
 use std::path::Path;

@@ -35,7 +35,7 @@ impl LeftOut {
     }
 
     /// Rows x, y, and samples of each replicate, as films store them.
-    pub(super) fn rows(&self) -> Vec<[u64; 2 + REPLICATES]> {
+    pub(crate) fn rows(&self) -> Vec<[u64; 2 + REPLICATES]> {
         let row = |(x, y, [a, b, c, d]): (u32, u32, [u64; REPLICATES])| {
             [u64::from(x), u64::from(y), a, b, c, d]
         };

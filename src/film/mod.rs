@@ -10,11 +10,8 @@
 pub mod coverage;
 mod heavy_tail;
 mod left_out;
-pub mod lock;
 pub mod merge;
-mod npz;
 pub mod pilot;
-pub mod store;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};

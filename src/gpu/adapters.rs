@@ -1,9 +1,10 @@
 //! What adapters there are, which one is taken, and the device opened on it.
 
 use super::GpuError;
+use super::instance::instance;
 use crate::engine::DeviceInfo;
 use crate::kernel::trips;
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 
 /// Which adapter is wanted.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -35,22 +36,12 @@ pub struct Gpu {
     failure: Arc<Mutex<Option<String>>>,
 }
 
-/// The one instance of the process, which is never dropped: with the last one the Vulkan loader would unload the driver,
-/// and NVIDIA's leaves each thread that has called it something to do at its end (seen with 580.159: a crash there).
-fn instance() -> &'static wgpu::Instance {
-    static INSTANCE: OnceLock<wgpu::Instance> = OnceLock::new();
-    INSTANCE.get_or_init(|| {
-        let mut desc = wgpu::InstanceDescriptor::new_without_display_handle();
-        desc.backends = wgpu::Backends::VULKAN;
-        // Validation layers and debug labels are for developing wgpu programs, at a price.
-        desc.flags = wgpu::InstanceFlags::empty();
-        wgpu::Instance::new(desc)
-    })
-}
-
 /// Discrete before integrated before virtual before software; ties keep the driver's order.
 fn sorted_adapters() -> Vec<wgpu::Adapter> {
-    let mut all = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::VULKAN));
+    let Some(instance) = instance() else {
+        return Vec::new();
+    };
+    let mut all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::VULKAN));
     all.sort_by_key(|a| match a.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,

@@ -4,6 +4,7 @@ mod adapters;
 mod engine;
 mod glances;
 mod held;
+mod instance;
 pub mod pack;
 pub mod probe;
 #[cfg(test)]

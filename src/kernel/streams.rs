@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn numbers_of_shadow_rays_and_glances_do_not_touch_what_they_are_added_to() {
-        assert!(crate::settings::DEFAULT_MAX_DEPTH < 1 << stream("SHADOW_RAY_SHIFT"));
+        assert!(crate::scene::DEFAULT_MAX_DEPTH < 1 << stream("SHADOW_RAY_SHIFT"));
         // The place of a glance is hashed with its number in the upper bits of the sample's.
         assert!(u64::from(MAX_GLANCES) < 1 << (32 - stream("GLANCE_SHIFT")));
     }

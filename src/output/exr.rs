@@ -1,9 +1,9 @@
 //! OpenEXR pictures: linear 32-bit floats with error layers.
 
-use super::atomic;
-use super::error::FileError;
 use super::metadata::{Value, entries};
 use super::pixels::Pixels;
+use crate::files::FileError;
+use crate::files::atomic;
 use crate::film::{Estimate, Film};
 use crate::provenance::Provenance;
 use exr::prelude::{

@@ -1,6 +1,6 @@
 //! Reads OpenEXR pictures, written by this or another program.
 
-use super::error::{FileError, open};
+use crate::files::{FileError, open};
 use exr::error::Error;
 use exr::image::{AnyChannel, AnyChannels, FlatSamples, Layer};
 use exr::meta::MetaData;

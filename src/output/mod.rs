@@ -1,15 +1,14 @@
-//! Writes pictures, reports and other files.
+//! Writes pictures, films, reports and other files.
 
-pub mod atomic;
-pub mod error;
 mod exr;
 mod exr_read;
 mod metadata;
+mod npz;
 mod pixels;
 mod png;
 pub mod report;
+pub mod store;
 
-pub use error::FileError;
 pub use exr::write_exr;
 pub use exr_read::{Picture, read_exr};
 pub(crate) use metadata::entries;
@@ -17,6 +16,7 @@ pub(crate) use pixels::Pixels;
 pub use png::write_png;
 pub use report::Report;
 
+use crate::files::FileError;
 use crate::film::Film;
 use crate::provenance::Provenance;
 use std::path::Path;

@@ -1,9 +1,9 @@
 //! PNG pictures: 8 bits per channel, sRGB.
 
-use super::atomic;
-use super::error::FileError;
 use super::metadata::{Value, entries};
 use super::pixels::Pixels;
+use crate::files::FileError;
+use crate::files::atomic;
 use crate::film::Film;
 use crate::provenance::Provenance;
 use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};

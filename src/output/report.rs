@@ -1,8 +1,8 @@
 //! The report of a run: JSON for scripts.
 
-use super::atomic;
-use super::error::FileError;
 use crate::engine::{Counters, DeviceInfo};
+use crate::files::FileError;
+use crate::files::atomic;
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::provenance::{Provenance, count_or_mean};

@@ -1,8 +1,9 @@
 //! The verdict as an assertion, for tests.
 
 use crate::compare::{Limits, Picture, compare, html};
+use crate::files::atomic;
 use crate::film::Film;
-use crate::output::{atomic, write_exr};
+use crate::output::write_exr;
 use crate::provenance::Provenance;
 use std::io::Write;
 use std::path::Path;
@@ -17,56 +18,28 @@ pub const BLESS: &str = "ETENDUE_BLESS";
 /// The film should have as many samples as the golden, and another seed; [`Settings::seed`] may come from the
 /// clock. Also panics if the golden is missing, damaged, without error layers, of another size or of another scene.
 ///
-/// [`Settings::seed`]: crate::settings::Settings::seed
+/// [`Settings::seed`]: crate::Settings::seed
 ///
 /// ```
-/// use etendue::film::{Film, coverage::Rect};
-/// use etendue::provenance::Provenance;
-/// use etendue::reference::{CpuEngine, Estimator};
-/// use etendue::scene::parse::parse_str;
-/// use etendue::settings::{Overrides, Settings};
-/// use etendue::{engine::Engine, regress::assert_golden, world::World};
-/// use std::path::Path;
+/// use etendue::{Backend, Options, Picture, Scene, regress::assert_golden};
 ///
-/// let text = r#"
-///     [camera]
-///     eye = [0.0, 1.0, 4.0]
-///     look_at = [0.0, 0.5, 0.0]
-///     vfov = 40.0
-///     resolution = [16, 12]
-///     [material.white]
-///     type = "diffuse"
-///     reflectance = [0.8, 0.8, 0.8]
-///     [[sphere]]
-///     center = [0.0, 0.5, 0.0]
-///     radius = 0.5
-///     material = "white"
-///     [[light]]
-///     center = [0.0, 3.0, 1.0]
-///     normal = [0.0, -1.0, 0.0]
-///     radius = 0.5
-///     radiance = [20.0, 20.0, 20.0]
-/// "#;
-/// let render = |seed| {
-///     let scene = parse_str(Path::new("ball.toml"), text).unwrap();
-///     let overrides = Overrides { seed: Some(seed), ..Overrides::default() };
-///     let settings = Settings::resolve(&scene, &overrides);
-///     let world = World::new(&scene, settings.size);
-///     let mut engine = CpuEngine::new(world, settings.clone(), Estimator::LightSampling);
-///     let rect = Rect::whole(settings.size);
-///     let mut film = Film::new(settings.size, rect, settings.strata);
-///     engine.render(&mut film, rect, 0..64, &Default::default()).unwrap();
-///     (film, Provenance::new(&scene, text, &settings))
+/// let render = |seed| -> Result<Picture, etendue::Error> {
+///     let scene = Scene::builder()
+///         .camera([0.0, 1.0, 4.0], [0.0, 0.5, 0.0], 40.0, [16, 12])
+///         .diffuse("white", [0.8; 3])
+///         .sphere([0.0, 0.5, 0.0], 0.5, "white")
+///         .light([0.0, 3.0, 1.0], [0.0, -1.0, 0.0], 0.5, [20.0; 3])
+///         .build()?;
+///     let backend = Backend::Cpu;
+///     etendue::render(&scene, &Options { spp: Some(64), seed: Some(seed), backend, ..Options::default() })
 /// };
 /// # let folder = tempfile::tempdir().unwrap();
 /// # let golden = folder.path().join("ball.exr");
-/// # let (film, provenance) = render(1);
-/// # let mut described = provenance.clone();
-/// # described.describe(&film);
-/// # etendue::output::write_exr(&golden, &film, &described).unwrap();
+/// # render(1)?.save(&golden)?;
 /// // let golden = Path::new("tests/golden/ball.exr");
-/// let (film, provenance) = render(2);
-/// assert_golden(&golden, &film, &provenance);
+/// let picture = render(2)?;
+/// assert_golden(&golden, picture.film(), picture.provenance());
+/// # Ok::<(), etendue::Error>(())
 /// ```
 #[track_caller]
 pub fn assert_golden(golden: &Path, film: &Film, provenance: &Provenance) {

@@ -7,16 +7,19 @@
 
 mod assertion;
 mod golden;
+#[doc(hidden)]
 pub mod report;
 
 pub use assertion::{BLESS, assert_golden};
+#[doc(hidden)]
 pub use golden::{Bless, Wanted, bless};
 
 use crate::compare::{Comparison, Limits, Picture, compare, html};
 use crate::engine::Engine;
+use crate::files::{FileError, atomic};
+use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::{Film, store};
-use crate::output::{FileError, atomic};
+use crate::output::store;
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason};
 use crate::scene::parse;
@@ -27,10 +30,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Makes an engine for a scene, and returns the most pixels per call.
+#[doc(hidden)]
 pub type MakeEngine<'a> =
     dyn Fn(&World, &Settings) -> Result<(Box<dyn Engine>, u64), Trouble> + Sync + 'a;
 
 /// Why a case could not be compared.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Trouble {
     /// The scene or the golden can't be used; why.
@@ -55,6 +60,7 @@ impl From<Trouble> for Outcome {
 }
 
 /// A scene, a golden picture, or both, under one name.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Case {
     /// The files' stem.
@@ -68,6 +74,7 @@ pub struct Case {
 }
 
 /// The result of a case.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// The same up to its noise.
@@ -283,6 +290,7 @@ fn render(
 }
 
 /// The scenes of `dir` and the goldens of `dir/golden` whose name contains `filter`, by name.
+#[doc(hidden)]
 pub fn cases(dir: &Path, filter: &str) -> Result<Vec<Case>, FileError> {
     let scenes = stems(dir, "toml")?;
     let golden = dir.join("golden");

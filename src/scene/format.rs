@@ -5,8 +5,7 @@ use super::value::{
     Angle, Count, Direction, Exponent, Ior, LARGEST_STRATA, Point, Radiance, Radius, Resolution,
     SMALLEST, Share, Text, Value, normalized,
 };
-use super::{Bsdf, Camera, Light, Place, RenderHints, Shape};
-use crate::settings::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA};
+use super::{Bsdf, Camera, DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Light, Place, RenderHints, Shape};
 use glam::DVec3;
 
 /// Whether a key may be left out.

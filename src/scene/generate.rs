@@ -265,8 +265,9 @@ impl List {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::provenance::hash::scene_hash;
     use crate::scene::check::lint;
-    use crate::scene::{hash::scene_hash, parse::parse_str};
+    use crate::scene::parse::parse_str;
     use crate::settings::{Overrides, Settings};
 
     #[test]

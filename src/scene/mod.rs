@@ -3,10 +3,11 @@
 //! [`parse`] reads it from TOML, [`schema`] describes the format to editors, [`check`] warns about
 //! likely mistakes, and [`World::new`](crate::world::World::new) prepares it for tracing rays.
 
+mod build;
 pub mod check;
 mod format;
+#[doc(hidden)]
 pub mod generate;
-pub mod hash;
 mod order;
 pub mod parse;
 mod reader;
@@ -16,13 +17,22 @@ mod source;
 mod surfaces;
 mod value;
 
+pub(crate) use build::checked;
+pub use build::{Invalid, SceneBuilder};
+#[doc(hidden)]
 pub use order::Canonical;
 pub use rows::MAX_ROWS_BYTES;
-pub use value::LARGEST_STRATA;
+pub use value::{LARGEST_RESOLUTION, LARGEST_STRATA};
 
 use glam::DVec3;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// Path vertices after the eye when neither file nor flag says.
+pub const DEFAULT_MAX_DEPTH: u32 = 64;
+
+/// Strata a side when neither file nor flag says: the report's 2 x 2.
+pub const DEFAULT_STRATA: u32 = 2;
 
 /// A whole scene file. Every value has passed the format's rules.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +53,23 @@ pub struct Scene {
     pub primitives: Vec<Primitive>,
     /// Disk lights in file order, those from files of rows last; at least one.
     pub lights: Vec<Light>,
+}
+
+impl Scene {
+    /// Begins a scene that is built in code.
+    pub fn builder() -> SceneBuilder {
+        SceneBuilder::default()
+    }
+
+    /// The scene in a file, and in the files of rows that it names.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, parse::ReadError> {
+        parse::read(path.as_ref())
+    }
+
+    /// The scene in the text of a scene file. Files of rows that it names lie relative to the working directory.
+    pub fn parse(text: &str) -> Result<Self, Invalid> {
+        parse::parse_str(Path::new("scene"), text).map_err(Invalid)
+    }
 }
 
 /// Pinhole camera. `up` is not parallel to the view.

@@ -7,7 +7,7 @@ use super::source::{Faults, Source, quoted, suggestion};
 use super::value::Text;
 use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Scene};
 use super::{rows, schema};
-use crate::output::error::reason;
+use crate::files::reason;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -37,7 +37,7 @@ pub enum ReadError {
     Invalid(Vec<Diagnostic>),
 }
 
-fn one_a_line(diagnostics: &[Diagnostic]) -> String {
+pub(super) fn one_a_line(diagnostics: &[Diagnostic]) -> String {
     let lines: Vec<String> = diagnostics.iter().map(Diagnostic::to_string).collect();
     lines.join("\n")
 }

@@ -6,7 +6,7 @@
 use super::source::{Source, quoted, suggestion};
 use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius};
 use super::{Diagnostic, Light, Place, Primitive, Shape};
-use crate::output::error::reason;
+use crate::files::reason;
 use glam::DVec3;
 use std::fs::File;
 use std::io::Read as _;

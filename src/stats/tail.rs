@@ -95,12 +95,23 @@ fn pareto_shape(sorted: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::Sampler;
+
+    /// SplitMix64: uniform numbers from 0 to below 1.
+    struct Uniform(u64);
+
+    impl Uniform {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ z >> 31) >> 11) as f64 / (1u64 << 53) as f64
+        }
+    }
 
     /// `n` numbers made from uniform ones.
     fn sample(n: usize, seed: u64, quantile: impl Fn(f64) -> f64) -> Vec<f64> {
-        let mut rng = Sampler::new(0, seed, 0);
-        (0..n).map(|_| quantile(1.0 - rng.uniform())).collect()
+        let mut rng = Uniform(seed << 32);
+        (0..n).map(|_| quantile(1.0 - rng.next())).collect()
     }
 
     fn shapes(quantile: impl Fn(f64) -> f64) -> Vec<Tail> {
@@ -130,10 +141,10 @@ mod tests {
         let uniform = shapes(|u| u);
         assert!(mean_shape(&uniform) < -0.7, "{}", mean_shape(&uniform));
         // Squares of normal numbers (Box and Muller's, one of each pair).
-        let mut rng = Sampler::new(0, 7, 0);
+        let mut rng = Uniform(7);
         let mut squares: Vec<f64> = (0..20_000)
             .map(|_| {
-                let (u, v) = (1.0 - rng.uniform(), rng.uniform());
+                let (u, v) = (1.0 - rng.next(), rng.next());
                 -2.0 * u.ln() * (2.0 * std::f64::consts::PI * v).cos().powi(2)
             })
             .collect();

@@ -3,7 +3,8 @@
 use crate::output_support::provenance;
 use crate::program::Bench;
 use etendue::film::coverage::Rect;
-use etendue::film::{Film, REPLICATES, store};
+use etendue::film::{Film, REPLICATES};
+use etendue::output::store;
 use std::time::Instant;
 
 /// Prints the cost of the fastest of five checkpoints, with and without an unfinished block.

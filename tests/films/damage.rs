@@ -3,7 +3,8 @@
 
 use crate::output_support::{forge, negate_first_count};
 use crate::program::{Bench, NAMESPACE, says};
-use etendue::film::{Film, store};
+use etendue::film::Film;
+use etendue::output::store;
 use predicates::prelude::*;
 use std::fs;
 

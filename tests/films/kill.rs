@@ -5,7 +5,7 @@ use crate::output_support::Random;
 use crate::program::{Bench, NAMESPACE, SCENE, says};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
-use etendue::film::store;
+use etendue::output::store;
 use etendue::provenance::Provenance;
 use etendue::scene::parse;
 use etendue::settings::{Overrides, Settings};

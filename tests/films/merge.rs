@@ -3,7 +3,8 @@
 use crate::output_support::provenance;
 use crate::program::{Bench, says};
 use etendue::film::coverage::Rect;
-use etendue::film::{Film, REPLICATES, Sums, store};
+use etendue::film::{Film, REPLICATES, Sums};
+use etendue::output::store;
 use predicates::prelude::*;
 use std::fs;
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use crate::output_support::seen_from_python;
 use crate::program::{Bench, SCENE, says};
-use etendue::film::store;
+use etendue::output::store;
 use etendue::provenance::{Provenance, SAMPLER_VERSION};
 use predicates::prelude::*;
 use serde_json::{Value, json};

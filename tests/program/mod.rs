@@ -3,7 +3,8 @@
 #![allow(dead_code, reason = "every test binary uses its own part of it")]
 
 use assert_cmd::Command;
-use etendue::film::{Film, store};
+use etendue::film::Film;
+use etendue::output::store;
 use etendue::output::{Picture, read_exr};
 use predicates::prelude::*;
 use std::fs;

@@ -7,7 +7,7 @@ mod scaling;
 pub use error::{Curve, ErrorPanel};
 pub use scaling::ScalingPanel;
 
-use crate::output::{FileError, atomic};
+use crate::files::{FileError, atomic};
 use chart::Pen;
 use plotters::backend::{BitMapBackend, SVGBackend};
 use plotters::coord::Shift;

@@ -4,6 +4,7 @@ use super::{Backend, Talk};
 use crate::cli::values;
 use crate::film::BLOCK;
 use crate::film::coverage::Rect;
+use crate::render::MAX_SHADOW_RAYS;
 use crate::scene::LARGEST_STRATA;
 use crate::settings::{Integrator, LightParts, Overrides};
 use clap::{Args, ValueEnum};
@@ -100,7 +101,7 @@ pub struct RenderArgs {
     )]
     pub integrator: IntegratorName,
     /// Light samples per path vertex, over all lights together [default: chosen from the scene]
-    #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true,
+    #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, MAX_SHADOW_RAYS.into()), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub shadow_rays: Option<u32>,
     /// Most path vertices after the eye, including the one on the light

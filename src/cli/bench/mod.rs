@@ -8,8 +8,8 @@ use super::args::Backend;
 use super::failure::Failure;
 use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
+use super::say;
 use super::signals::Signals;
-use super::{backend, memory, say};
 use crate::bench::plot::{self, ErrorPanel, Panel};
 use crate::bench::{
     Contender, EngineKind, Entrant, Plan, Reference, Results, Unready, mean_path_length, measure,
@@ -18,8 +18,9 @@ use crate::bench::{
 use crate::engine::EngineError;
 use crate::gpu::Gpu;
 use crate::kernel::Access;
+use crate::provenance::hash::scene_hash;
+use crate::render::{backend, memory};
 use crate::run::Tally;
-use crate::scene::hash::scene_hash;
 use crate::scene::{Scene, parse};
 use crate::settings::Settings;
 use crate::world::World;

@@ -5,9 +5,9 @@ use crate::bench::plot::{Panel, ScalingPanel};
 use crate::bench::scaling::{self, Plan, Scaling, Series, text};
 use crate::bench::{EngineKind, Unready, record};
 use crate::cli::failure::Failure;
-use crate::cli::memory;
 use crate::engine::EngineError;
 use crate::kernel::Access;
+use crate::render::memory;
 use crate::settings::Settings;
 use crate::world::World;
 

@@ -1,13 +1,25 @@
 //! Chooses what renders: a real GPU, else a software adapter, else the CPU reference.
 
-use super::args::Backend;
-use super::failure::Failure;
+use super::Error;
 use crate::engine::{Engine, tile_pixels};
 use crate::gpu::{self, Gpu, GpuEngine, GpuError, Making};
 use crate::kernel::Access;
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
 use crate::world::World;
+
+/// What renders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum Backend {
+    /// A hardware GPU if there is one, else a software adapter, else the CPU reference.
+    #[default]
+    Auto,
+    /// Any adapter, hardware or software.
+    Gpu,
+    /// The f64 reference.
+    Cpu,
+}
 
 /// The command that installs a software adapter (Debian, Ubuntu).
 pub const GET_ADAPTER: &str = "apt-get install mesa-vulkan-drivers";
@@ -35,7 +47,7 @@ pub fn choose(
     world: &World,
     settings: &Settings,
     tell: impl FnMut(Making),
-) -> Result<Chosen, Failure> {
+) -> Result<Chosen, Error> {
     if backend == Backend::Cpu {
         return Ok(cpu(world, settings, None));
     }
@@ -65,7 +77,7 @@ pub fn choose(
 pub fn open(
     backend: Backend,
     adapter: Option<&str>,
-) -> Result<(Option<Gpu>, Option<String>), Failure> {
+) -> Result<(Option<Gpu>, Option<String>), Error> {
     if backend == Backend::Cpu {
         return Ok((None, None));
     }
@@ -78,17 +90,8 @@ pub fn open(
     }
 }
 
-/// Refuses `--adapter` together with `--backend cpu`.
-pub fn check_flags(backend: Backend, adapter: Option<&str>) -> Result<(), Failure> {
-    if backend == Backend::Cpu && adapter.is_some() {
-        let message = "--adapter can't be used with --backend cpu, which uses no adapter";
-        return Err(Failure::Input(message.into()));
-    }
-    Ok(())
-}
-
-/// The note that the CPU reference renders instead, if the flags allow that; else the failure.
-fn instead(e: &GpuError, backend: Backend, adapter: Option<&str>) -> Result<String, Failure> {
+/// The note that the CPU reference renders instead, if that is allowed; else the failure.
+fn instead(e: &GpuError, backend: Backend, adapter: Option<&str>) -> Result<String, Error> {
     match e {
         _ if backend == Backend::Auto && adapter.is_none() => {
             let faster = match e {
@@ -99,10 +102,10 @@ fn instead(e: &GpuError, backend: Backend, adapter: Option<&str>) -> Result<Stri
             };
             Ok(format!("{e}; rendering on the CPU reference{faster}"))
         }
-        GpuError::NoAdapter(_) if adapter.is_none() => Err(Failure::Device(format!(
+        GpuError::NoAdapter(_) if adapter.is_none() => Err(Error::Device(format!(
             "{e}; to install a software adapter: {GET_ADAPTER}"
         ))),
-        _ => Err(Failure::Device(e.to_string())),
+        _ => Err(Error::Device(e.to_string())),
     }
 }
 

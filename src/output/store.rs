@@ -12,12 +12,12 @@
 //! `f = numpy.load("x.npz"); json.loads(f["provenance"].item())`, and a pixel's mean is
 //! `f["sums"].sum(2)[..., :3] / f["counts"][..., None]` when no block is unfinished.
 
-use super::coverage::{Coverage, Rect};
 use super::npz::{self, Array, Damage, Reader};
-use super::pilot::Pilot;
-use super::{BLOCK, Film, REPLICATES, Sums};
-use crate::output::atomic;
-use crate::output::error::{FileError, open};
+use crate::files::atomic;
+use crate::files::{FileError, open};
+use crate::film::coverage::{Coverage, Rect};
+use crate::film::pilot::Pilot;
+use crate::film::{BLOCK, Film, REPLICATES, Sums};
 use crate::provenance::Provenance;
 use crate::scene::LARGEST_STRATA;
 use serde::{Deserialize, Serialize};

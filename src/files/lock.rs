@@ -3,7 +3,7 @@
 //! While a process renders into a film, it locks a file beside it. The operating system releases the lock when the process
 //! ends, even if it is killed. The lock file then stays, but is unlocked.
 
-use crate::output::FileError;
+use crate::files::FileError;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};

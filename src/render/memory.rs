@@ -1,6 +1,6 @@
 //! Checks that a picture fits into memory before anything is allocated.
 
-use super::failure::Failure;
+use super::Error;
 use crate::engine::MAX_TILE_PIXELS;
 use std::fs;
 
@@ -20,9 +20,9 @@ fn needed(pixels: u64) -> u64 {
 }
 
 /// Refuses a film of `pixels` pixels that does not fit into memory.
-pub fn check(pixels: u64) -> Result<(), Failure> {
+pub fn check(pixels: u64) -> Result<(), Error> {
     match available() {
-        Some(have) if needed(pixels) > have => Err(Failure::Input(format!(
+        Some(have) if needed(pixels) > have => Err(Error::Input(format!(
             "a film of {:.1} million pixels needs {:.1} GB of memory, but only {:.1} GB are free; use a smaller --size, \
                  or render one --region at a time",
             pixels as f64 / 1e6,

@@ -3,7 +3,7 @@
 //! A killed process leaves its temporary file behind. A running process holds a lock on its file,
 //! so the next process that writes the same name can recognise leftovers, and removes them.
 
-use super::error::FileError;
+use super::FileError;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};

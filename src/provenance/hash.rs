@@ -5,7 +5,7 @@
 //! different hashes. Scenes that differ never have the same hash. Order in the file counts only among surfaces of one kind
 //! that coincide, since there it decides which one a ray meets.
 
-use super::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
+use crate::scene::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
 use crate::settings::{Integrator, LightParts, Settings};
 use glam::DVec3;
 use sha2::{Digest, Sha256};

@@ -1,0 +1,8 @@
+//! Files: how they are written whole, held by one process at a time, and what can go wrong with them.
+
+pub mod atomic;
+mod error;
+pub mod lock;
+
+pub(crate) use error::reason;
+pub use error::{FileError, open};

@@ -1,0 +1,318 @@
+//! A picture from a scene in one call: the way of the data for a program that uses the library. The command line goes the
+//! same way by the same steps, and adds films, checkpoints and files.
+
+pub mod backend;
+pub mod memory;
+mod picture;
+pub mod plan;
+
+pub use backend::Backend;
+pub use picture::Picture;
+
+use crate::engine::{DeviceInfo, EngineError};
+use crate::files::FileError;
+use crate::film::Film;
+use crate::film::coverage::Rect;
+use crate::film::pilot::Pilot;
+use crate::provenance::Provenance;
+use crate::run::{self, Job, Run, StopReason, Tally};
+use crate::scene::parse::ReadError;
+use crate::scene::{
+    self, Canonical, Diagnostic, Invalid, LARGEST_RESOLUTION, LARGEST_STRATA, Scene,
+};
+use crate::settings::{Integrator, LightParts, Overrides, Settings};
+use crate::world::World;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// Samples a pixel when no stop condition is given.
+pub const DEFAULT_SPP: u64 = 256;
+
+/// The most samples that a pixel can have: they are numbered in 32 bits.
+pub const MAX_SAMPLES: u64 = u32::MAX as u64;
+
+/// The most light samples at a vertex.
+pub const MAX_SHADOW_RAYS: u32 = 1024;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The scene breaks rules of its format, one message for each place; never empty.
+    #[error("{}", one_a_line(.0))]
+    Scene(Vec<Diagnostic>),
+    /// Options that cannot be, or do not fit together or the scene.
+    #[error("{0}")]
+    Input(String),
+    /// No usable adapter, or the device failed.
+    #[error("{0}")]
+    Device(String),
+    /// A file can't be had, or its content is wrong.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// It was stopped before any pixel had a sample.
+    #[error("stopped before the first sample")]
+    Stopped,
+}
+
+fn one_a_line(diagnostics: &[Diagnostic]) -> String {
+    let lines: Vec<String> = diagnostics.iter().map(Diagnostic::to_string).collect();
+    lines.join("\n")
+}
+
+impl From<ReadError> for Error {
+    fn from(e: ReadError) -> Self {
+        match e {
+            ReadError::Io { path, source } => {
+                FileError::io(&path, "cannot read the scene", &source).into()
+            }
+            ReadError::Invalid(diagnostics) => Self::Scene(diagnostics),
+        }
+    }
+}
+
+impl From<Invalid> for Error {
+    fn from(Invalid(diagnostics): Invalid) -> Self {
+        Self::Scene(diagnostics)
+    }
+}
+
+/// What to render, with what, and until when: the first stop condition that is met ends it. Without any it is
+/// [`DEFAULT_SPP`] samples a pixel.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Stop when every pixel has this many samples (with `adaptive`: on average).
+    pub spp: Option<u64>,
+    /// Stop after this long in the engine, but not before every pixel has a sample. How many samples that is differs from run
+    /// to run.
+    pub time: Option<Duration>,
+    /// Stop when the picture's estimated relative error is at most this; 0.02 is 2 %.
+    pub error: Option<f64>,
+    /// Set it to true, from any thread, to end the rendering at once; [`render`] then gives what there is.
+    pub stop: Arc<AtomicBool>,
+    /// What renders.
+    pub backend: Backend,
+    /// Part of the name of the adapter to use, in any case.
+    pub adapter: Option<String>,
+    /// Width and height in pixels instead of the scene's.
+    pub size: Option<[u32; 2]>,
+    /// Only these pixels; the whole picture if empty.
+    pub regions: Vec<Rect>,
+    /// Samples go where the noise is.
+    pub adaptive: bool,
+    /// Seed of every random number; the scene's, or 0, if not given.
+    pub seed: Option<u32>,
+    /// Path vertices after the eye, the one on the light included.
+    pub max_depth: Option<u32>,
+    /// Cells a side into which a pixel is divided.
+    pub strata: Option<u32>,
+    /// Light samples at every vertex, over all lights together.
+    pub shadow_rays: Option<u32>,
+    /// Which light is kept; all if not given.
+    pub light: Option<LightParts>,
+    /// How light travels; the whole rendering equation if not given.
+    pub integrator: Option<Integrator>,
+}
+
+impl Options {
+    /// Refuses values that no picture can have.
+    fn check(&self) -> Result<(), Error> {
+        let within = |what: &str, value: Option<u64>, low: u64, high: u64| match value {
+            Some(v) if !(low..=high).contains(&v) => Err(Error::Input(format!(
+                "{what} is {v}, but must be a whole number from {low} to {high}"
+            ))),
+            _ => Ok(()),
+        };
+        for side in self.size.iter().flatten() {
+            let side = Some(u64::from(*side));
+            within("a side of size", side, 1, LARGEST_RESOLUTION.into())?;
+        }
+        within("spp", self.spp, 1, MAX_SAMPLES)?;
+        within(
+            "max_depth",
+            self.max_depth.map(u64::from),
+            1,
+            u32::MAX.into(),
+        )?;
+        within(
+            "strata",
+            self.strata.map(u64::from),
+            1,
+            LARGEST_STRATA.into(),
+        )?;
+        within(
+            "shadow_rays",
+            self.shadow_rays.map(u64::from),
+            1,
+            MAX_SHADOW_RAYS.into(),
+        )?;
+        if let Some(error) = self.error
+            && !(error > 0.0 && error.is_finite())
+        {
+            let message = format!("error is {error}, but must be a finite number above 0");
+            return Err(Error::Input(message));
+        }
+        if let Some(light) = self.light
+            && !(light.emitted || light.direct || light.indirect)
+        {
+            return Err(Error::Input("light keeps none, but must keep some".into()));
+        }
+        if self.backend == Backend::Cpu && self.adapter.is_some() {
+            let message = "adapter names a GPU, which the CPU reference does not use";
+            return Err(Error::Input(message.into()));
+        }
+        Ok(())
+    }
+
+    fn overrides(&self) -> Overrides {
+        Overrides {
+            size: self.size,
+            max_depth: self.max_depth,
+            strata: self.strata,
+            seed: self.seed,
+            shadow_rays: self.shadow_rays,
+            light: self.light,
+            integrator: self.integrator,
+        }
+    }
+
+    /// The pixels to render, within a picture of `size`.
+    fn rects(&self, size: [u32; 2]) -> Result<Vec<Rect>, Error> {
+        let whole = Rect::whole(size);
+        if self.regions.is_empty() {
+            return Ok(vec![whole]);
+        }
+        let [width, height] = size;
+        for r in &self.regions {
+            if r.area() == 0 || r.union(&whole) != whole {
+                return Err(Error::Input(format!(
+                    "region {r} is empty or reaches out of the picture of {width}x{height} pixels"
+                )));
+            }
+        }
+        Ok(self.regions.clone())
+    }
+}
+
+/// How far a rendering has come.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress<'a> {
+    film: &'a Film,
+    tally: &'a Tally,
+}
+
+impl Progress<'_> {
+    /// Samples of a pixel so far, on average.
+    pub fn samples(&self) -> f64 {
+        self.tally.samples
+    }
+
+    /// Seconds spent rendering so far.
+    pub fn seconds(&self) -> f64 {
+        self.tally.seconds
+    }
+
+    /// The part that is done, 0 to 1, by the stop condition that looks nearest; `None` while nothing is known.
+    pub fn fraction(&self) -> Option<f64> {
+        self.tally.forecast.map(|f| f.fraction)
+    }
+
+    /// Seconds left, likewise.
+    pub fn seconds_left(&self) -> Option<f64> {
+        self.tally.forecast.map(|f| f.left)
+    }
+
+    /// The picture's relative error so far; `None` while some pixel has fewer than two samples. Takes a look at every pixel.
+    pub fn relative_error(&self) -> Option<f64> {
+        self.film.relative_error()
+    }
+}
+
+/// Renders `scene`. The scene is checked first, whether it was read, built, or changed since; nothing is printed.
+///
+/// ```
+/// use etendue::{Backend, Options, Scene};
+///
+/// let scene = Scene::builder()
+///     .camera([0.0, 1.0, 4.0], [0.0, 0.5, 0.0], 40.0, [16, 12])
+///     .diffuse("white", [0.8; 3])
+///     .sphere([0.0, 0.5, 0.0], 0.5, "white")
+///     .light([0.0, 3.0, 1.0], [0.0, -1.0, 0.0], 0.5, [20.0; 3])
+///     .build()?;
+/// let options = Options { spp: Some(16), backend: Backend::Cpu, ..Options::default() };
+/// let picture = etendue::render(&scene, &options)?;
+/// assert_eq!(picture.size(), [16, 12]);
+/// assert!(picture.relative_error().is_some());
+/// # Ok::<(), etendue::Error>(())
+/// ```
+pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
+    render_with(scene, options, |_| ControlFlow::Continue(()))
+}
+
+/// The same, and `watch` hears how far it has come, about once a second. When it breaks, the rendering ends, and the picture
+/// is what there is.
+pub fn render_with(
+    scene: &Scene,
+    options: &Options,
+    mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<Picture, Error> {
+    options.check()?;
+    let (scene, text) = scene::checked(scene).map_err(Error::Scene)?;
+    let settings = Settings::resolve(&scene, &options.overrides());
+    let regions = options.rects(settings.size)?;
+    let bounds = plan::bounds(&regions);
+    memory::check(bounds.area())?;
+    let ordered = Canonical::new(&scene);
+    let before = Provenance::of(&ordered, text, &settings);
+    let world = World::of(&ordered, settings.size);
+    let mut film = Film::new(settings.size, bounds, settings.strata);
+    film.pilot = options.adaptive.then(|| Pilot::new(&regions));
+    let adapter = options.adapter.as_deref();
+    let mut chosen = backend::choose(options.backend, adapter, &world, &settings, |_| ())?;
+    let ends = options.time.is_some() || options.error.is_some();
+    let unless_told = if ends { MAX_SAMPLES } else { DEFAULT_SPP };
+    let job = Job {
+        tiles: run::tiles(&regions, chosen.tile_pixels),
+        samples: 0..options.spp.unwrap_or(unless_told),
+        round: settings.round(),
+        time: options.time,
+        error: options.error,
+        call: run::CALL,
+        adaptive: options.adaptive.then_some(settings.seed),
+    };
+    let device = chosen.engine.device().clone();
+    let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &options.stop);
+    // What ends it besides the engine is `watch`, and that is no error.
+    let ended = run.go(|film, tally| match watch(&Progress { film, tally }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(None::<EngineError>),
+    });
+    let tally = run.tally;
+    let ended = match ended {
+        Ok(reason) => reason,
+        Err(None) => StopReason::Interrupted,
+        Err(Some(e)) => return Err(Error::Device(e.to_string())),
+    };
+    if film.coverage.is_empty() {
+        return Err(Error::Stopped);
+    }
+    let provenance = provenance(&before, &device, &film, &tally);
+    Ok(Picture::new(film, provenance, ended, chosen.note))
+}
+
+/// The provenance of `film`, which a run on `device` has brought on from `before`.
+pub fn provenance(
+    before: &Provenance,
+    device: &DeviceInfo,
+    film: &Film,
+    tally: &Tally,
+) -> Provenance {
+    let mut provenance = before.clone();
+    provenance.add_work(device, tally.counters, tally.seconds);
+    provenance.describe(film);
+    provenance
+}
+
+#[cfg(test)]
+mod tests;
