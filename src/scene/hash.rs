@@ -1,28 +1,28 @@
 //! The scene hash: two files with the same hash have the same expected picture.
 //!
-//! It covers what the scene means and the settings that change what the picture converges to. Values
-//! count as they are read, so two ways to write one surface (a plane through another of its
-//! points) are two scenes: the hash may part what is equal, never join what differs. Order in the file counts
-//! among surfaces of one kind that coincide, for there it decides what is met, and nowhere else.
+//! It covers what the scene means, and the settings that change what the picture converges to. Values count as they are read, so
+//! two ways to write one surface (a plane given by two different points) are two scenes. Equal pictures may have different
+//! hashes, but different pictures never have the same. The order of the file counts only among surfaces of one kind that coincide,
+//! where it decides which of them is met.
 
 use super::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
 use crate::settings::{Integrator, LightParts, Settings};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 
-/// Directions are rounded to this fraction of a unit, so that a normal's length in the file, which
-/// normalising leaves a trace of in the last bits, does not count. No pixel is as narrow.
+/// Directions are rounded to this fraction of a unit. The length of a normal in the file leaves a trace in the last bits of the unit
+/// vector, and must not count. No pixel is as narrow as this step.
 const DIRECTION_STEP: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// SHA-256, in hexadecimal, of what the picture of `scene` under `settings` converges to.
 ///
-/// Not covered: comments, layout, title, names, materials that nothing uses, order where it means nothing, and what only moves the
-/// noise (seed, strata, shadow rays).
+/// Not covered: comments, layout, title, names, materials that nothing uses, order where it means nothing, and settings that change
+/// only the noise (seed, strata, shadow rays).
 pub fn scene_hash(scene: &Scene, settings: &Settings) -> String {
     hash_of(&Canonical::new(scene), settings)
 }
 
-/// [`scene_hash`] of the scene that was put in order.
+/// The same as [`scene_hash`], of a scene that is in its one order.
 pub fn hash_of(scene: &Canonical, settings: &Settings) -> String {
     let mut h = Hasher(Sha256::new_with_prefix("etendue scene 2\0"));
     let scene = scene.scene();
@@ -108,7 +108,7 @@ impl Hasher {
         self.number(vfov);
         let forward = (look_at - eye).normalize();
         self.direction(forward);
-        // Of `up` only the part across the view means anything.
+        // Only the part of `up` across the view means anything.
         self.direction(forward.cross(up.normalize()).normalize());
     }
 
@@ -291,7 +291,9 @@ mod tests {
                 c.up = DVec3::new(0.3, 5.0, -4.0);
                 c.look_at = c.eye + (c.look_at - c.eye) * 3.0;
             }),
-            ("max_depth said aloud", |_, f| f.max_depth = Some(64)),
+            ("the default max_depth, given explicitly", |_, f| {
+                f.max_depth = Some(64)
+            }),
         ];
         let expected = hash(&scene(), &Overrides::default());
         assert_eq!(expected.len(), 64);

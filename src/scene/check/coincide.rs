@@ -1,11 +1,11 @@
-//! Surfaces that coincide. The format says which of them is met first, so that the picture is well
-//! defined; but unless it is a thing that rests on another, it is rarely meant.
+//! Surfaces that coincide. The format says which of them is met first, so the picture is well defined. But the author rarely means it,
+//! unless one thing rests on another.
 
 use super::{Warnings, called, is_dielectric};
 use crate::coincidence::{COINCIDENT, Flat};
 use crate::scene::{Place, Scene, Shape};
 
-/// In the order in which coincident surfaces are met.
+/// Kinds of surface, in the order in which surfaces that coincide are met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
     Light,
@@ -25,7 +25,7 @@ struct Face {
 struct Thing {
     kind: &'static str,
     place: Place,
-    /// None for lights.
+    /// `None` for lights.
     shape: Option<Shape>,
     material: Option<usize>,
     dielectric: bool,
@@ -39,8 +39,8 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     for (i, a) in things.iter().enumerate() {
         for b in &things[i + 1..] {
             if let Some((rank_a, rank_b)) = suspect(a, b) {
-                // `a` is a light, or before `b` among the primitives; the file's order decides
-                // between surfaces of equal rank.
+                // `a` is a light, or before `b` among the primitives. The order of the file decides between surfaces of
+                // equal rank.
                 let a_first = (rank_a, a.place.line) <= (rank_b, b.place.line);
                 let (first, second) = if a_first { (a, b) } else { (b, a) };
                 warnings.add(second.place, || {
@@ -90,13 +90,13 @@ fn faces(shape: &Shape) -> Vec<Face> {
     flats.map(|flat| Face { rank, flat }).collect()
 }
 
-/// The ranks of two surfaces that coincide and should not.
+/// The ranks of two surfaces that coincide and should not; `None` if there are none.
 fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
     let both_opaque = !a.dielectric && !b.dielectric;
     let alike = both_opaque && a.material.is_some() && a.material == b.material;
     if let (Some(s), Some(t)) = (&a.shape, &b.shape)
         && s.curved_coincides(t, COINCIDENT)
-        // Overlapping pieces of one opaque thing show the same wherever they are met.
+        // Overlapping pieces of one opaque material look the same, whichever is met.
         && (!alike || same_length(s, t))
     {
         return Some((Rank::Curved, Rank::Curved));
@@ -112,7 +112,7 @@ fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
                 (Rank::Disk, Rank::Disk) => alike && !f.flat.same_disk(&g.flat),
                 // Flush on an opaque wall.
                 (Rank::Light | Rank::Disk, _) => both_opaque,
-                // One stands on the other; or they are parts of one thing.
+                // One stands on the other, or both are parts of one thing.
                 (Rank::Cap, Rank::Cap) => {
                     let touch = opposite && !(a.dielectric && b.dielectric);
                     touch || alike
