@@ -292,7 +292,7 @@ mod tests {
                 c.look_at = c.eye + (c.look_at - c.eye) * 3.0;
             }),
             ("the default max_depth, given explicitly", |_, f| {
-                f.max_depth = Some(64)
+                f.max_depth = Some(64);
             }),
         ];
         let expected = hash(&scene(), &Overrides::default());
