@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Tells in JSON what readers that are not ours see in pictures and films.
+"""Prints as JSON what independent readers find in pictures and films.
 
     pip install OpenEXR numpy pillow
     python3 scripts/check_outputs.py picture.exr picture.png film.npz
 
-Prints one JSON object for each file, a line each. For every channel or array: type, shape, smallest
-and largest value, and all values of small ones. Exits 1, saying why, when a file can't be read.
+Prints one JSON object per file, each on one line. It has the type, shape, smallest and largest value of
+every channel or array, and all values of small ones. Exits with 1 and a message if a file can't be read.
 """
 
 import json
@@ -14,12 +14,12 @@ import zipfile
 
 import numpy
 
-# Files with at most this many numbers in an array are shown whole.
+# Arrays with at most this many numbers are printed in full.
 SHOW = 4096
 
 
 def describe(array):
-    """Type, shape, range and, of small arrays, the values."""
+    """Type, shape, range and, for small arrays, the values."""
     told = {"dtype": array.dtype.str, "shape": list(array.shape)}
     if array.size and array.dtype.kind in "fiu":
         told["min"] = array.min().item()
@@ -31,10 +31,10 @@ def describe(array):
 
 
 def plain(value):
-    """What JSON can hold of a header's value; text for the rest."""
+    """A header's value as JSON; converted to text if JSON has no such type."""
     if isinstance(value, (str, int, float, bool)):
         return value
-    if isinstance(value, numpy.ndarray):  # numbers come as arrays of one
+    if isinstance(value, numpy.ndarray):  # numbers are arrays with one element
         return value.item() if value.size == 1 else value.tolist()
     return str(value)
 
@@ -45,7 +45,7 @@ def exr(path):
 
     with OpenEXR.File(path, separate_channels=True) as file:
         if len(file.parts) != 1:
-            raise ValueError(f"{len(file.parts)} parts, not one")
+            raise ValueError(f"expected one part, found {len(file.parts)}")
         window = file.header()["dataWindow"]
         return {
             "channels": {name: describe(c.pixels) for name, c in file.channels().items()},
@@ -99,7 +99,7 @@ def main(paths):
         try:
             told = READERS[extension](path)
         except KeyError:
-            print(f"{path}: not .exr, .png or .npz", file=sys.stderr)
+            print(f"{path}: the name must end in .exr, .png or .npz", file=sys.stderr)
             return 2
         except (OSError, ValueError, RuntimeError, zipfile.BadZipFile) as error:
             print(f"{path}: {error}", file=sys.stderr)

@@ -1,6 +1,24 @@
 // Random numbers, keyed by (pixel, sample, dimension, seed) [Jarzynski2020]: the value of a sample depends
 // on nothing else, so the work can be cut anywhere.
 
+// Streams: what is mixed into a key so that two uses of one pixel and sample share no random numbers. They are declared here alone;
+// src/kernel/streams.rs reads them, for the host and for the test that no two of them meet.
+
+// Times its number, into the seed of a glance.
+const GLANCE_STREAM: u32 = 0x9e3779b9u;
+// Into the seed of the coin that gives glances their halves at glass.
+const COIN_STREAM: u32 = 0x7f4a7c15u;
+// Into the seed of a replicate's shifts of its low-discrepancy numbers.
+const SHIFT_STREAM: u32 = 0x5bd1e995u;
+// Into the seed of the order in which a pixel's strata are visited.
+const ORDER_STREAM: u32 = 0xffffffffu;
+// Into the seed of the host's pilots, whose samples are in no picture.
+const PILOT_STREAM: u32 = 0xb5297a4du;
+// Shadow ray k has its number in the depth of its key, from this bit on.
+const SHADOW_RAY_SHIFT: u32 = 20u;
+// Glance k has its number in the sample of the key of its place in the pixel, from this bit on.
+const GLANCE_SHIFT: u32 = 24u;
+
 fn pcg4d(key: vec4u) -> vec4u {
     var v = key * 1664525u + 1013904223u;
     v.x += v.y * v.w;
@@ -20,12 +38,23 @@ fn unit_float(v: vec4u) -> vec4f {
     return vec4f(v >> vec4u(8u)) * 0x1.0p-24;
 }
 
-// What one path vertex draws.
+// What a vertex draws: all of it uniform in [0, 1).
 struct Draws {
-    // Point on a light (2), direction of scattering (2).
-    points: vec4f,
-    // Which light, which lobe (or reflection against refraction), roulette; the last is spare.
-    choices: vec4f,
+    // Point on a light, and direction of scattering.
+    light_point: vec2f,
+    direction: vec2f,
+    // Which light; which lobe, or reflection against refraction; roulette; and one to spare.
+    light: f32,
+    lobe: f32,
+    roulette: f32,
+    spare: f32,
+}
+
+// What one light sample takes of it.
+struct LightDraws {
+    which: vec2f,
+    point: vec2f,
+    lobe: f32,
 }
 
 fn draw(key: vec4u) -> Draws {
@@ -36,15 +65,41 @@ fn draw(key: vec4u) -> Draws {
     b.y += b.z * b.x;
     b.z += b.x * b.y;
     b.w += b.y * b.z;
-    return Draws(unit_float(a), unit_float(b));
+    let points = unit_float(a);
+    let choices = unit_float(b);
+    return Draws(points.xy, points.zw, choices.x, choices.y, choices.z, choices.w);
 }
 
-// The same for the first vertex that scatters into more than one direction: light choice and point from the additive
-// recurrence of the plastic ratio's kin [Roberts2018], the lobe of a glossy surface from the golden ratio's, direction
-// from the first two dimensions of Sobol's sequence [Burley2020]. All run through the samples i of one replicate; a
-// shift of its own, modulo 1 and digit by digit, makes every sample uniform and the replicates independent.
-fn draw_spread(u: Draws, pixel: u32, replicate: u32, i: u32, seed: u32) -> Draws {
-    let shift = hash_pixel(pixel, replicate, seed ^ 0x5bd1e995u);
+// What the vertex with key (pixel, sample, depth, seed) draws. The first vertex that scatters into more than one direction gets
+// low-discrepancy numbers for its light, its direction, and if it is glossy its lobe: of several specular vertices in a row each
+// chooses between reflection and refraction on its own.
+fn draw_vertex(key: vec4u, first: bool, glossy: bool) -> Draws {
+    let u = draw(key);
+    let round = key.y / ROUND_SAMPLES;
+    let i = round / REPLICATES * ROUND_SAMPLES + key.y % ROUND_SAMPLES;
+    let spread = draw_spread(key.x, round % REPLICATES, i, key.w);
+    return Draws(
+        select(u.light_point, spread.light_point, first),
+        select(u.direction, spread.direction, first),
+        select(u.light, spread.light, first),
+        select(u.lobe, spread.lobe, first && glossy),
+        u.roulette,
+        u.spare
+    );
+}
+
+struct SpreadDraws {
+    light_point: vec2f,
+    direction: vec2f,
+    light: f32,
+    lobe: f32,
+}
+
+// Low-discrepancy numbers: light choice and point from the additive recurrence of the plastic ratio's kin [Roberts2018], the lobe
+// from the golden ratio's, direction from the first two dimensions of Sobol's sequence [Burley2020]. All run through the samples i
+// of one replicate; a shift of its own, modulo 1 and digit by digit, makes every sample uniform and the replicates independent.
+fn draw_spread(pixel: u32, replicate: u32, i: u32, seed: u32) -> SpreadDraws {
+    let shift = hash_pixel(pixel, replicate, seed ^ SHIFT_STREAM);
     let more = (shift ^ (shift >> vec2u(16u))) * 0x9e3779b1u;
     let light = vec3u(shift.x ^ more.y, shift) + i * vec3u(0xd1b54a33u, 0xabc98389u, 0x8cb92ba7u);
     let x = reverseBits(i);
@@ -54,15 +109,10 @@ fn draw_spread(u: Draws, pixel: u32, replicate: u32, i: u32, seed: u32) -> Draws
     y ^= (y & 0x33333333u) << 2u;
     y ^= (y & 0x55555555u) << 1u;
     let direction = vec2u(x, y) ^ more;
-    let points = unit_float(vec4u(light.yz, direction));
-#if PHONG
     let lobe = ((more.y ^ (more.y >> 15u)) * 0x2c1b3c6du) + i * 0x9e3779b9u;
+    let points = unit_float(vec4u(light.yz, direction));
     let choices = unit_float(vec4u(light.x, lobe, 0u, 0u));
-    return Draws(points, vec4f(choices.xy, u.choices.zw));
-#else
-    let choice = unit_float(light.xxxx).x;
-    return Draws(points, vec4f(choice, u.choices.yzw));
-#endif
+    return SpreadDraws(points.xy, points.zw, choices.x, choices.y);
 }
 
 // Two words for the place in a pixel, which asks for less than light does: few multiplications, for every one of them is
@@ -75,56 +125,3 @@ fn hash_pixel(pixel: u32, s: u32, seed: u32) -> vec2u {
     let w = (v ^ 0x68bc21ebu) * 0x846ca68bu;
     return vec2u(v, w ^ (w >> 16u));
 }
-
-#if STRATA
-
-// Position i of a random permutation of `count` cells of a pixel.
-fn shuffled_cell(i: u32, count: u32, order: u32) -> u32 {
-#if STRATA_NOT_A_POWER_OF_TWO
-    return permute(i, count, order);
-#else
-    return (i ^ (order >> 16u)) % count;
-#endif
-}
-#endif
-
-#if STRATA_NOT_A_POWER_OF_TWO
-// Position i of a random permutation of `count` elements, keyed by p [Kensler2013].
-fn permute(i: u32, count: u32, p: u32) -> u32 {
-    var mask = count - 1u;
-    mask |= mask >> 1u;
-    mask |= mask >> 2u;
-    mask |= mask >> 4u;
-    mask |= mask >> 8u;
-    mask |= mask >> 16u;
-    var k = permute_step(i, mask, p);
-    // Fewer than half of all values lie outside; each is sent on until it lies inside.
-    while k >= count {
-        k = permute_step(k, mask, p);
-    }
-    return (k + p) % count;
-}
-
-fn permute_step(i: u32, mask: u32, p: u32) -> u32 {
-    var k = i;
-    k ^= p;
-    k *= 0xe170893du;
-    k ^= p >> 16u;
-    k ^= (k & mask) >> 4u;
-    k ^= p >> 8u;
-    k *= 0x0929eb3fu;
-    k ^= p >> 23u;
-    k ^= (k & mask) >> 1u;
-    k *= 1u | (p >> 27u);
-    k *= 0x6935fa69u;
-    k ^= (k & mask) >> 11u;
-    k *= 0x74dcb303u;
-    k ^= (k & mask) >> 2u;
-    k *= 0x9e501cc3u;
-    k ^= (k & mask) >> 2u;
-    k *= 0xc860a3dfu;
-    k &= mask;
-    k ^= k >> 5u;
-    return k;
-}
-#endif

@@ -1,15 +1,16 @@
-//! What every engine, GPU or CPU reference, offers to the renderer.
+//! The interface of all engines: GPU and CPU reference.
 
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use std::ops::{AddAssign, Range};
 use std::sync::atomic::AtomicBool;
 
-/// The most pixels an engine is given at once; larger pictures are tiled.
+/// Most pixels in one call to an engine; larger pictures are tiled.
 pub const MAX_TILE_PIXELS: u64 = 1 << 20;
 
-/// The most pixels to give an engine on this device at once. The CPU reference: a sample of each takes a fraction of a second.
-/// A software adapter: in a call's time it takes many samples of each, and its lanes wait less for each other's longer paths.
+/// Most pixels in one call to an engine on this device. The CPU reference gets few, so that one sample of each takes a fraction
+/// of a second. A software adapter gets few, so that a call takes many samples per pixel and its lanes wait less for
+/// each other's longer paths.
 pub fn tile_pixels(device: &DeviceInfo) -> u64 {
     match (device.backend.as_str(), device.software) {
         ("cpu", _) => 1 << 16,
@@ -34,14 +35,15 @@ impl Part {
     }
 }
 
-/// Makes samples.
+/// Takes samples.
 pub trait Engine {
-    /// Adds the samples of `parts` to `film`: each has samples of its own, and pixels of `tile` that are in none get none.
+    /// Adds the samples of `parts` to `film`. Each part has its own sample numbers; pixels of `tile` outside all parts get no
+    /// samples.
     ///
-    /// The parts are disjoint and lie in `tile`, which has at most [`MAX_TILE_PIXELS`]; calls for the same tile one after
-    /// another are the cheapest. The samples of a part lie within one [block](crate::film::BLOCK); its pixels have had the
-    /// same of that block so far, and none of these. When `stop` becomes true the call may give up with
-    /// [`EngineError::Stopped`]; on any error the film is as it was.
+    /// The parts are disjoint and lie in `tile`, which has at most [`MAX_TILE_PIXELS`] pixels. Consecutive calls for the same
+    /// tile are cheapest. The samples of a part lie within one [block](crate::film::BLOCK). All pixels of a part have the same
+    /// earlier samples of that block, and none of these. When `stop` becomes true, the call may return
+    /// [`EngineError::Stopped`]. After an error the film is unchanged.
     fn render_parts(
         &mut self,
         film: &mut Film,
@@ -61,14 +63,14 @@ pub trait Engine {
         self.render_parts(film, rect, &[Part { rect, samples }], stop)
     }
 
-    /// Goes on with another seed.
+    /// Changes the seed of later samples.
     fn reseed(&mut self, seed: u32);
 
     /// What it runs on.
     fn device(&self) -> &DeviceInfo;
 }
 
-/// What a picture was made on.
+/// The device that rendered a picture.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct DeviceInfo {
     /// The adapter's name, or the CPU reference's.
@@ -82,7 +84,7 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
-    /// Whether a sample has the same bits on both. How many threads the CPU reference has is no matter.
+    /// Whether samples have the same bits on both devices. The CPU reference's number of threads does not matter.
     pub fn rounds_like(&self, other: &Self) -> bool {
         (&self.name, &self.backend) == (&other.name, &other.backend)
             && (self.backend == "cpu" || self.driver == other.driver)

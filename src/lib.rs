@@ -1,4 +1,4 @@
-//! etendue: a GPU path tracer for analytic scenes that says how wrong every picture still is.
+//! etendue: a GPU path tracer for analytic scenes that reports the error of every picture.
 //!
 //! ```text
 //! scenes/x.toml -> scene::parse -> Scene -> World -> kernel::compose and gpu

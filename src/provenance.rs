@@ -1,4 +1,4 @@
-//! Where a film comes from: enough to make it again, and to know what may be added to it.
+//! Where a film comes from: enough to render it again, and to check which films can be merged with it.
 
 use crate::engine::{Counters, DeviceInfo};
 use crate::film::Film;
@@ -7,10 +7,10 @@ use crate::scene::{Canonical, Scene};
 use crate::settings::{Integrator, LightParts, Settings};
 use serde::{Deserialize, Serialize, Serializer};
 
-/// Changes whenever a sample of the same number and seed gets another value.
+/// Incremented whenever a change to the program changes the value of any sample.
 pub const SAMPLER_VERSION: u32 = 7;
 
-/// What a film was made from, by and on.
+/// The scene, program and devices that a film was rendered with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The program's name.
@@ -25,7 +25,7 @@ pub struct Provenance {
     pub scene_hash: String,
     /// The scene file's own text.
     pub scene_text: String,
-    /// Everything else that decides the samples.
+    /// The settings, which together with the scene determine the samples.
     pub settings: Settings,
     /// Samples of a covered pixel on average.
     #[serde(serialize_with = "count_or_mean")]
@@ -96,8 +96,7 @@ impl Provenance {
         self.relative_error = film.relative_error();
     }
 
-    /// Adds the work behind another film that is merged into this one's; [`describe`](Self::describe)
-    /// the sum afterwards.
+    /// Adds the work of a film that is merged into this one. Call [`describe`](Self::describe) for the sum afterwards.
     pub fn absorb(&mut self, other: &Self) {
         for used in &other.devices {
             self.add_use(used.clone());
@@ -116,9 +115,8 @@ impl Provenance {
         }
     }
 
-    /// Whether sample k of a pixel has the same value in both, so that a film of one can be gone on with
-    /// as the other, or disjoint samples of both added up. The error names all that differs, this
-    /// one's value first.
+    /// Whether sample k of a pixel has the same value in both, so that one film can be resumed as the other, and disjoint
+    /// samples of both can be merged. The error lists all differences, with the value of `self` first.
     pub fn same_samples(&self, other: &Self) -> Result<(), String> {
         let (a, b) = (&self.settings, &other.settings);
         let mut differ = Vec::new();
@@ -153,7 +151,7 @@ impl Provenance {
         }
         let same_expected_settings = (a.size, a.max_depth, a.light, a.integrator)
             == (b.size, b.max_depth, b.light, b.integrator);
-        // The hash covers those settings too: where one of them differs, it says nothing of the scene.
+        // The hash covers those settings too. If one of them differs, the hash differs even for the same scene.
         if same_expected_settings {
             let scene = |p: &Self| {
                 let title = p.scene_title.as_deref().unwrap_or("untitled");
@@ -196,7 +194,7 @@ pub(crate) fn count_or_mean<S: Serializer>(mean: &f64, to: S) -> Result<S::Ok, S
     }
 }
 
-/// `emitted,direct,indirect` or what is kept of it, as `--light` reads it.
+/// The parts of `emitted,direct,indirect` that are kept, in the format of `--light`.
 pub fn light_name(light: LightParts) -> String {
     let parts = [
         (light.emitted, "emitted"),
@@ -269,7 +267,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn each_thing_that_changes_samples_is_named() {
+    fn every_setting_that_changes_samples_is_named() {
         let a = Provenance {
             sampler_version: 3,
             ..example([4, 3])
@@ -309,7 +307,7 @@ pub(crate) mod tests {
         assert_eq!(
             a.same_samples(&other),
             Ok(()),
-            "other adapters, titles and versions do no harm"
+            "other adapters, titles and versions are allowed"
         );
     }
 

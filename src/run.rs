@@ -1,9 +1,9 @@
-//! Drives an engine from an empty or half-done film to a stop condition.
+//! Drives an engine, from an empty or resumed film, until a stop condition is met.
 //!
-//! Time decides how much work an engine is given at once, and nothing else: which samples a pixel has
-//! had when the run ends is decided by the [`Job`] (unless `time` or a signal ends it), and the picture does
-//! not depend on how they were cut ([`crate::film`]). Error is looked at only after sample counts
-//! of a fixed sequence, so that the same request stops at the same sample on every machine.
+//! Time decides only how much work an engine gets per call. The [`Job`] decides which samples each pixel has
+//! at the end (unless `time` or a signal ends the run), and the picture does not depend on how the work was cut
+//! ([`crate::film`]). The error is checked only after fixed sample counts, so that the same command stops at the same sample
+//! on every machine.
 
 use crate::engine::{Counters, Engine, EngineError, MAX_TILE_PIXELS, Part};
 use crate::film::coverage::{Coverage, Rect};
@@ -14,26 +14,26 @@ use std::time::{Duration, Instant};
 
 mod adaptive;
 
-/// How long a call to the engine should take: short enough for progress to move and for a signal to cost little, long
-/// enough that the calls' own cost (reading back and folding, 10 to 20 ms at 512 x 384) does not matter.
+/// How long a call to the engine should take. Short enough that progress moves and a signal is obeyed soon; long
+/// enough that the overhead of a call (reading back and folding, 10 to 20 ms at 512 x 384) does not matter.
 pub const CALL: Duration = Duration::from_millis(1000);
 
-/// Factor between the sample counts at which the error is looked at when it may end the run.
+/// Factor between the sample counts at which the error is checked, if it can end the run.
 const CHECK_FACTOR: f64 = 1.25;
 
-/// The fewest samples at which the error may end a run.
+/// The smallest sample count at which the error can end a run.
 const MIN_CHECKED_SAMPLES: u64 = 16;
 
-/// The first pass over all tiles ends after so many samples: a picture to follow then soon has no holes. Shorter passes
-/// would make a software adapter's lanes wait.
+/// Samples in the first pass over all tiles. A short pass soon gives every pixel samples, so that a `--watch` picture has no
+/// holes. An even shorter one would leave lanes of a software adapter idle.
 const FIRST_PASS: u64 = 64;
 
-/// What is to be done.
+/// The work of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Job {
     /// Disjoint rectangles of at most [`MAX_TILE_PIXELS`] pixels: see [`tiles`].
     pub tiles: Vec<Rect>,
-    /// The sample numbers that every pixel is to have in the end.
+    /// The sample numbers that every pixel shall have at the end.
     pub samples: Range<u64>,
     /// Samples in one round, strata².
     pub round: u64,
@@ -43,8 +43,8 @@ pub struct Job {
     pub error: Option<f64>,
     /// How long a call to the engine should take at most, usually [`CALL`].
     pub call: Duration,
-    /// Samples go where the noise is, by pilots made with a seed that differs from this one, the engine's; `samples`
-    /// then starts at 0 and ends at the mean that the pixels are to have.
+    /// The engine's seed, for an adaptive run. Its pilots use another seed. `samples` then starts at 0 and ends at the mean
+    /// sample count of the pixels.
     pub adaptive: Option<u32>,
 }
 
@@ -53,7 +53,7 @@ pub struct Job {
 pub enum StopReason {
     /// Every pixel has its samples.
     Samples,
-    /// The time was over.
+    /// The time was used up.
     Time,
     /// The relative error was reached.
     Error,
@@ -61,44 +61,43 @@ pub enum StopReason {
     Interrupted,
 }
 
-/// What a run has done so far.
+/// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tally {
-    /// Paths, rays and mishaps of this run.
+    /// Counts of paths, rays, and truncated or non-finite samples of this run.
     pub counters: Counters,
     /// Seconds spent in the engine by this run.
     pub seconds: f64,
-    /// Of the samples that the job wants, those that a pixel has now, on average over the pixels.
+    /// Samples of the job that a pixel has now, averaged over the pixels.
     pub samples: f64,
-    /// Whether every pixel has a sample of those that the job wants.
+    /// Whether every pixel has at least one sample of the job.
     pub complete: bool,
-    /// Where it may end the run: [`Film::cautious_error`] when it was last looked at, and the samples a pixel then.
+    /// If the error can end the run: [`Film::cautious_error`] at the last check, and the samples per pixel at that time.
     pub error: Option<(u64, f64)>,
-    /// Where the end is, by the stop condition that looks nearest; `None` while nothing is known.
+    /// The expected end, by the stop condition that will be met first; `None` while it is unknown.
     pub forecast: Option<Forecast>,
 }
 
 /// When a run will end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forecast {
-    /// Samples a pixel done, of those that it takes; 0..=1.
+    /// Fraction of the samples that are done, 0..=1.
     pub fraction: f64,
     /// Seconds left.
     pub left: f64,
 }
 
-/// The longest side of a tile: every adapter's textures are larger (WebGPU promises 8192 texels), by the texel too that
-/// the GPU's tiles may add to it.
+/// The longest side of a tile. Every adapter allows larger textures (WebGPU guarantees 8192 texels), also with the extra
+/// texel that a GPU tile may need.
 const MAX_TILE_SIDE: u32 = 4096;
 
-/// Cuts regions into tiles: disjoint rectangles that together hold the regions' pixels, bands of rows of
-/// columns, at most 4096 pixels a side and `limit` pixels in all (at least one row). Where the cuts lie
-/// touches no bit of the picture.
+/// Cuts regions into tiles: disjoint rectangles that together cover the regions. Each is at most 4096 pixels wide and high,
+/// and has at most `limit` pixels (but at least one row). The cuts do not change any bit of the picture.
 pub fn tiles(regions: &[Rect], limit: u64) -> Vec<Rect> {
     let limit = limit.min(MAX_TILE_PIXELS);
     let mut out = Vec::new();
     for r in Rect::disjoint(regions).into_iter().flat_map(columns) {
-        // Bands of equal height: a sliver as the last one would cost a call of its own.
+        // Bands of equal height: a thin last band would cost a whole call.
         let most = (limit / u64::from(r.width())).clamp(1, MAX_TILE_SIDE.into());
         let bands = u64::from(r.height()).div_ceil(most);
         let rows = u64::from(r.height()).div_ceil(bands) as u32;
@@ -125,10 +124,11 @@ fn columns(r: Rect) -> impl Iterator<Item = Rect> {
     })
 }
 
-/// The first sample count after `count` at which the error may end a run: whole numbers of rounds of all replicates,
-/// spaced by [`CHECK_FACTOR`], from [`MIN_CHECKED_SAMPLES`]. Of counts that no pixel can have, the first.
+/// The first sample count after `count` at which the error is checked: a multiple of one round of every replicate,
+/// starting at [`MIN_CHECKED_SAMPLES`], with [`CHECK_FACTOR`] between two checks. Beyond the largest possible sample count it
+/// returns the same count for every `count`.
 fn next_check(count: u64, round: u64) -> u64 {
-    // A forecast may ask for any count: beyond this one the numbers below would overflow in the end.
+    // A forecast may pass any count; beyond this one the numbers below would overflow.
     let count = count.min(u32::MAX.into());
     let period = round * REPLICATES as u64;
     let mut check = MIN_CHECKED_SAMPLES.div_ceil(period) * period;
@@ -145,9 +145,9 @@ pub struct Run<'a> {
     engine: &'a mut dyn Engine,
     film: &'a mut Film,
     stop: &'a AtomicBool,
-    /// What it has done.
+    /// Progress so far.
     pub tally: Tally,
-    /// Seconds that one sample of one pixel takes, by the last call.
+    /// Seconds per sample of one pixel, measured in the last call.
     pace: Option<f64>,
     /// Pixels of the largest tile.
     widest: u64,
@@ -158,7 +158,7 @@ pub struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    /// Readies a run; `film` holds the pixels of every tile. `stop` ends it at the next opportunity.
+    /// Prepares a run. `film` holds the pixels of every tile. Setting `stop` ends the run at the next opportunity.
     pub fn new(
         job: &'a Job,
         engine: &'a mut dyn Engine,
@@ -191,8 +191,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Renders until something ends the run. `after` is called after every call to the engine, to show,
-    /// save or stop; what it fails with ends the run. On failure the film keeps what was done.
+    /// Renders until a stop condition is met. Calls `after` after every call to the engine, to show progress or
+    /// save; an error from it ends the run. After an error the film keeps the samples so far.
     pub fn go<E: From<EngineError>>(
         &mut self,
         mut after: impl FnMut(&Film, &Tally) -> Result<(), E>,
@@ -229,7 +229,7 @@ impl<'a> Run<'a> {
                         }
                         self.tally.forecast = self.forecast();
                         after(self.film, &self.tally)?;
-                        // One call tells the pace; all others are of the right length.
+                        // The first call measures the speed; all later ones then have the right length.
                         if learning {
                             continue 'passes;
                         }
@@ -239,7 +239,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// One call to the engine; false when it was stopped.
+    /// Calls the engine once. Returns false if it was stopped.
     fn call(&mut self, tile: Rect, parts: &[Part]) -> Result<bool, EngineError> {
         let done = self.call_on(None, tile, parts)?;
         if done {
@@ -249,7 +249,7 @@ impl<'a> Run<'a> {
         Ok(done)
     }
 
-    /// One call to the engine, on another film than the run's if one is given; false when it was stopped.
+    /// Calls the engine once, on `film` if given, else on the run's film. Returns false if it was stopped.
     fn call_on(
         &mut self,
         other: Option<&mut Film>,
@@ -270,8 +270,8 @@ impl<'a> Run<'a> {
         Ok(true)
     }
 
-    /// Where a pass that starts at `at` ends: at the end of the block, of the job, or of what a call can do in time, and
-    /// where the error is looked at next. The first is one sample long.
+    /// Where a pass that starts at `at` ends: at the end of the block or the job, at the next check of the error, or when the
+    /// call has taken long enough. The first pass has one sample.
     fn pass_end(&self, at: u64) -> u64 {
         let block_end = (at / BLOCK + 1) * BLOCK;
         let count = at - self.job.samples.start;
@@ -285,7 +285,7 @@ impl<'a> Run<'a> {
             let fits = |seconds: f64, pixels: u64| (seconds / (pace * pixels as f64)) as u64;
             length = fits(self.job.call.as_secs_f64(), self.widest);
             if let Some(time) = self.job.time {
-                // So that all tiles come to the same count when the time ends.
+                // All tiles must have the same count when the time is used up.
                 let left = (time.as_secs_f64() - self.tally.seconds).max(0.0);
                 length = length.min(fits(left, self.pixels));
             }
@@ -296,8 +296,8 @@ impl<'a> Run<'a> {
             .min(self.job.samples.end)
     }
 
-    /// Whether the time is over, or would be before half of this call were done. The first sample of
-    /// a pixel is never too late: a picture has no holes.
+    /// Whether the time is used up, or would be before half of this call is done. The first sample of
+    /// a pixel is never too late, so that the picture has no holes.
     fn too_late(&self, parts: &[Part]) -> bool {
         let Some(time) = self.job.time else {
             return false;
@@ -309,7 +309,7 @@ impl<'a> Run<'a> {
         self.tally.seconds + self.pace.unwrap_or(0.0) * paths(parts) / 2.0 > time.as_secs_f64()
     }
 
-    /// Looks at the error after `count` samples of every pixel if it may end the run; whether it is small enough.
+    /// Checks the error after `count` samples per pixel, if it can end the run. Returns whether it is small enough.
     fn enough(&mut self, count: u64) -> bool {
         let Some(wanted) = self.job.error else {
             return false;
@@ -329,11 +329,11 @@ impl<'a> Run<'a> {
         let mut needed = (job.samples.end - job.samples.start) as f64;
         if let Some(time) = job.time {
             let in_time = done + (time.as_secs_f64() - self.tally.seconds) / per_sample;
-            // The first sample of every pixel is waited for.
+            // The time can't end the run before every pixel has a sample.
             needed = needed.min(in_time.max(1.0));
         }
         match (job.error, self.tally.error) {
-            // The error falls with the square root of the samples, and is next looked at then or later.
+            // The error falls with the square root of the samples. The run ends at the first check after that.
             (Some(target), Some((count, error))) => {
                 let reached = count as f64 * (error / target).powi(2);
                 let check = next_check((reached as u64).max(count), job.round);
@@ -350,7 +350,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// The first sample number from `from` on that some pixel of the job lacks; the job's end if none.
+/// The first sample number from `from` on that some pixel of the job does not have; the job's end if there is none.
 fn first_missing(coverage: &Coverage, job: &Job, from: u64) -> u64 {
     job.tiles
         .iter()
@@ -377,7 +377,7 @@ fn is_complete(coverage: &Coverage, job: &Job) -> bool {
     job.tiles.iter().all(|t| area(t) == t.area())
 }
 
-/// Samples times pixels that the film has of the job's tiles.
+/// Samples times pixels of the job's tiles that the film has.
 fn held(coverage: &Coverage, job: &Job) -> f64 {
     let of = |(rect, ranges): (Rect, &[Range<u64>])| {
         let parts = job.tiles.iter().filter_map(|t| t.intersection(&rect));
@@ -387,7 +387,7 @@ fn held(coverage: &Coverage, job: &Job) -> f64 {
     coverage.cells().map(of).sum()
 }
 
-/// Samples times pixels that the job still lacks.
+/// Samples times pixels that the job still needs.
 fn missing(coverage: &Coverage, job: &Job) -> f64 {
     let of = |(rect, ranges): (Rect, Vec<Range<u64>>)| {
         rect.area() as f64 * ranges.iter().map(|r| r.end - r.start).sum::<u64>() as f64

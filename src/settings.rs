@@ -1,18 +1,18 @@
-//! Everything besides the scene that decides what is rendered: flags over the file's hints over defaults.
+//! The render settings: flags override the scene file, which overrides the defaults.
 
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
-/// Path vertices after the eye when neither file nor flag says.
+/// Default number of path vertices after the eye.
 pub const DEFAULT_MAX_DEPTH: u32 = 64;
-/// Strata a side when neither file nor flag says: the report's 2 x 2.
+/// Default number of strata per side: the report's 2 x 2.
 pub const DEFAULT_STRATA: u32 = 2;
 
 /// How light travels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Integrator {
-    /// The whole of the rendering equation.
+    /// The full rendering equation.
     Path,
     /// Mirrors and glass are followed, other surfaces take direct light only.
     Whitted,
@@ -73,9 +73,9 @@ pub struct Settings {
     pub size: [u32; 2],
     /// Path vertices after the eye, >= 1.
     pub max_depth: u32,
-    /// Whether nobody chose `max_depth`: a cut path is then worth a warning.
+    /// Whether `max_depth` is the default: truncated paths are then worth a warning.
     pub max_depth_is_default: bool,
-    /// Pixel cells a side, >= 1.
+    /// Pixel cells per side, >= 1.
     pub strata: u32,
     /// Seed of every random number.
     pub seed: u32,

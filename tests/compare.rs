@@ -1,4 +1,4 @@
-//! `etendue compare` and its parts: what is told apart, what is refused, and the page in a real browser.
+//! `etendue compare`: its verdicts, its errors, and its page in a real browser.
 
 mod output_support;
 
@@ -19,7 +19,7 @@ fn etendue() -> Command {
     Command::new(assert_cmd::cargo::cargo_bin!("etendue"))
 }
 
-/// A film of 64 samples a pixel: every replicate's mean is `light` of the pixel, give or take half of it.
+/// A film of 64 samples per pixel: every replicate's mean is `light` of the pixel, give or take half of it.
 fn noisy(size: [u32; 2], bounds: Rect, seed: u64, light: impl Fn(u32, u32) -> f64) -> Film {
     let mut random = Random(seed);
     let mut film = Film::new(size, bounds, 2);
@@ -83,7 +83,7 @@ fn patch(x: u32, y: u32) -> f64 {
 }
 
 #[test]
-fn noise_is_the_same_and_a_patch_is_not() {
+fn noise_is_equal_and_a_patch_is_different() {
     let p = Pictures::new();
     let a = p.put("a.exr", &whole(1, |_, _| 1.0));
     let b = p.put("b.npz", &whole(2, |_, _| 1.0));
@@ -91,7 +91,7 @@ fn noise_is_the_same_and_a_patch_is_not() {
     run(&a, &b, &[])
         .code(0)
         .stdout(contains(
-            "the same up to their noise (false alarms: 0.001); a change of all light by",
+            "equal up to noise (false-alarm rate 0.001); would have detected a change of the whole picture's brightness by",
         ))
         .stdout(
             contains("relative RMSE")
@@ -101,26 +101,24 @@ fn noise_is_the_same_and_a_patch_is_not() {
     run(&a, &c, &[])
         .code(1)
         .stdout(contains("different in ").and(contains("pixels at (16, 8)")));
-    // The verdict stands, whatever the limits say; and limits count where there is a verdict.
+    // Limits don't override the verdict, and they also count if there is a verdict.
     run(&a, &c, &["--max-flip", "1"]).code(1);
     run(&a, &b, &["--max-relative-rmse", "0.1%"])
         .code(1)
-        .stdout(contains("different by the limits given (relative RMSE is "))
-        .stdout(contains(
-            "as a difference; without them the same up to their noise",
-        ));
+        .stdout(contains("different by the given limits (relative RMSE is "))
+        .stdout(contains("as a difference; without them: equal up to noise"));
     run(&a, &c, &["--max-relative-rmse", "0.1%"])
         .code(1)
-        .stdout(
-            contains("different in ").and(contains("; and by the limits given (relative RMSE is ")),
-        );
-    // Small rates are told in few digits.
+        .stdout(contains("different in ").and(contains(
+            "; also different by the given limits (relative RMSE is ",
+        )));
+    // Small rates are printed with few digits.
     run(&a, &b, &["--alpha", "1e-300"])
         .code(0)
-        .stdout(contains("(false alarms: 1e-300)"));
+        .stdout(contains("(false-alarm rate 1e-300)"));
     run(&a, &a, &[])
         .code(0)
-        .stdout(contains("the same to the bit").and(contains("both were made with seed")));
+        .stdout(contains("bit-identical").and(contains("both were rendered with seed")));
 }
 
 #[test]
@@ -181,10 +179,14 @@ fn bad_input_is_named() {
     let empty = Film::new(SIZE, Rect::whole(SIZE), 2);
     run(&a, &p.put("empty.exr", &empty), &[])
         .code(2)
-        .stderr(contains("empty.exr: no pixel has a sample"));
+        .stderr(contains(
+            "empty.exr: no pixel has samples, so there is nothing to compare",
+        ));
     run(&p.put("empty.npz", &empty), &a, &[])
         .code(2)
-        .stderr(contains("empty.npz: no pixel has a sample"));
+        .stderr(contains(
+            "empty.npz: no pixel has samples, so there is nothing to compare",
+        ));
 
     let mut bytes = std::fs::read(&a).expect("there");
     bytes.truncate(bytes.len() / 2);
@@ -195,20 +197,20 @@ fn bad_input_is_named() {
     std::fs::write(p.path("text.png"), "no picture").expect("written");
     run(&a, &p.path("text.png"), &["--max-flip", "1"])
         .code(2)
-        .stderr(contains("text.png: no usable PNG"));
+        .stderr(contains("text.png: invalid PNG"));
     run(&a, &p.path("none.exr"), &[])
         .code(4)
         .stderr(contains("none.exr: cannot read: no such file"));
     std::fs::write(p.path("a.tiff"), "x").expect("written");
     run(&a, &p.path("a.tiff"), &[])
         .code(2)
-        .stderr(contains(".exr, a .npz (film) or a .png"));
+        .stderr(contains("can be compared (.exr, .png, or .npz film)"));
     run(&a, &a, &["--alpha", "0"]).code(2);
     run(&a, &a, &["--html", "/nowhere/x.html"]).code(4);
 }
 
 #[test]
-fn nan_is_named_wherever_it_comes_from() {
+fn nan_is_named_for_every_kind_of_picture() {
     let p = Pictures::new();
     let a = p.put("a.exr", &whole(1, |_, _| 1.0));
     let nan = whole(2, |x, y| if (x, y) == (7, 5) { f64::NAN } else { 1.0 });
@@ -223,7 +225,7 @@ fn nan_is_named_wherever_it_comes_from() {
 
 /// The values are those of the authors' own flip-evaluator 1.7 (LDR, default pixels per degree).
 #[test]
-fn flip_is_its_authors_flip() {
+fn flip_equals_the_authors_implementation() {
     let (w, h) = (24u32, 18u32);
     let mut a = Vec::new();
     let mut b = Vec::new();
@@ -328,7 +330,7 @@ fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
 }
 
 #[test]
-fn the_page_stands_alone_and_works_in_a_browser() {
+fn the_page_is_self_contained_and_works_in_a_browser() {
     let p = Pictures::new();
     let a = p.put("a.exr", &whole(1, |_, _| 0.4));
     let b = p.put("b<i>.exr", &whole(3, |x, y| 0.4 * patch(x, y)));

@@ -72,7 +72,7 @@ fn both(scene: &Scene, size: [u32; 2], access: Access) -> Option<String> {
         .or_else(|| on_cpu().map(|f| format!("reference: {f}")))
 }
 
-/// A room with a thing of every material; `eye`, `look_at`, `vfov` and more tables as given.
+/// A room with an object of every material, and with the given `eye`, `look_at`, `vfov` and additional tables.
 fn room(eye: &str, look_at: &str, vfov: &str, more: &str) -> String {
     format!(
         r#"
@@ -145,7 +145,7 @@ fn fields_of_view_from_a_hair_to_nearly_all() {
 }
 
 #[test]
-fn eyes_where_a_side_is_a_matter_of_rounding() {
+fn eyes_on_surfaces() {
     let cases = [
         ("on a ball", "-1.0, 2.0, 0.0", "1.0, 3.0, 0.0"),
         ("on the floor", "0.0, 0.0, 5.0", "0.0, 1.0, 0.0"),

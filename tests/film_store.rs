@@ -33,7 +33,7 @@ fn refused(path: &Path, bytes: &[u8]) -> String {
 }
 
 #[test]
-fn a_film_comes_back_and_goes_on_with_the_same_bits() {
+fn a_loaded_film_is_resumed_with_the_same_bits() {
     let dir = tempfile::tempdir().unwrap();
     let mut lacking = whole_film();
     lacking.leave_out(3, 1, [1, 0, 2, 0]);
@@ -58,7 +58,7 @@ fn a_film_comes_back_and_goes_on_with_the_same_bits() {
 }
 
 #[test]
-fn saving_over_a_film_replaces_it_and_failing_to_leaves_it() {
+fn a_failed_save_leaves_the_old_film() {
     let dir = tempfile::tempdir().unwrap();
     let (path, _) = saved(dir.path(), &region_film());
     let film = whole_film();
@@ -149,7 +149,7 @@ fn every_truncation_is_detected() {
         assert!(text.contains("truncated"), "{text}");
     }
     let text = refused(&path, &[&good[..], b"x"].concat());
-    assert!(text.contains("after its end"), "{text}");
+    assert!(text.contains("extra bytes at the end"), "{text}");
     let text = refused(&path, b"");
     assert!(text.contains("not a film: it is empty"), "{text}");
 }
@@ -161,15 +161,15 @@ fn other_kinds_of_files_are_named() {
     let zip = b"PK\x03\x04\x14\0\0\0\x08\0".repeat(50);
     let png = b"\x89PNG\r\n\x1a\n".repeat(50);
     for (bytes, what) in [
-        (vec![0; 5000], "it is no NumPy archive (.npz)"),
+        (vec![0; 5000], "it is not a NumPy archive (.npz)"),
         (
             b"title = \"x\"\n".repeat(100),
-            "it is no NumPy archive (.npz)",
+            "it is not a NumPy archive (.npz)",
         ),
         (png, "it is a PNG picture"),
         (
             zip,
-            "it is an archive, but its first array is not \"provenance\"",
+            "it is a ZIP archive, but its first array is not \"provenance\"",
         ),
     ] {
         let text = refused(&path, &bytes);
@@ -210,12 +210,12 @@ fn inconsistent_films_are_refused_saying_why() {
         (
             "\"size\":[7,5]",
             "\"size\":[0,5]",
-            "size 0x5: a side has 1 to 65536",
+            "its size is 0x5, but each side must have 1 to 65536",
         ),
         (
             "\"size\":[7,5]",
             "\"size\":[5,5]",
-            "its part 1,1,6,4 does not lie in the picture of 5x5 pixels",
+            "its region 1,1,6,4 exceeds the picture of 5x5 pixels",
         ),
         (
             "\"size\":[7,5]",
@@ -225,11 +225,11 @@ fn inconsistent_films_are_refused_saying_why() {
         ("\"strata\":2", "\"strata\":3", "contradict its provenance"),
         ("\"block\":256", "\"block\":128", "blocks of 128 samples"),
         ("\"replicates\":4", "\"replicates\":8", "8 replicates"),
-        ("\"x1\":6", "\"x1\":5", "does not lie in the film"),
+        ("\"x1\":6", "\"x1\":5", "exceeds the film's region"),
         (
             "\"start\":0,\"end\":256",
             "\"start\":0,\"end\":255",
-            "counts 256 samples",
+            "has a count of 256 samples",
         ),
         (
             "\"start\":0,\"end\":256",
@@ -239,7 +239,7 @@ fn inconsistent_films_are_refused_saying_why() {
         (
             "\"start\":0,\"end\":256",
             "\"start\":-1,\"end\":25",
-            "provenance is wrong",
+            "provenance is invalid",
         ),
         ("\"coverage\":", "\"coverbge\":", "missing field `coverage`"),
     ] {
@@ -306,13 +306,14 @@ fn bad_numbers_are_refused_with_their_pixel() {
     let mut bytes = fs::read(&path).unwrap();
     negate_first_count(&mut bytes, 300);
     let text = refused(&path, &bytes);
-    let count = "pixel (0, 0) counts 18446744073709551615 samples where its coverage has 300";
+    let count =
+        "pixel (0, 0) has a count of 18446744073709551615 samples, but its coverage has 300";
     assert!(text.contains(count), "{text}");
 }
 
-/// What NumPy saves again has other headers: that is said, not that something is missing.
+/// A film that NumPy has rewritten has other headers. The message says that, not that an array is missing.
 #[test]
-fn films_saved_by_another_program_are_named_so() {
+fn films_saved_by_another_program_are_recognised() {
     if std::env::var("ETENDUE_SKIP_PYTHON").is_ok_and(|v| v == "1") {
         eprintln!("ETENDUE_SKIP_PYTHON=1: not saved again by NumPy");
         return;
@@ -332,7 +333,7 @@ fn films_saved_by_another_program_are_named_so() {
         let text = load(&again).unwrap_err().to_string();
         assert!(
             text.contains(
-                "is not as etendue writes it: the film is damaged, or another program has saved it"
+                "was not written by etendue: the film is damaged, or another program has rewritten it"
             ),
             "{text}"
         );
@@ -361,7 +362,7 @@ fn a_small_file_that_claims_to_be_huge_is_refused_at_once() {
     forge(&mut bytes, "\"x1\":6,\"y1\":4", "\"x1\":7,\"y1\":4");
     let text = refused(&path, &bytes);
     let counts =
-        "array \"counts\" has 120 bytes of numbers, and 3 x 6 numbers of type u64 take 144";
+        "array \"counts\" has 120 bytes of numbers, but 3 x 6 numbers of type u64 need 144";
     assert!(text.contains(counts), "{text}");
 }
 
@@ -378,13 +379,13 @@ fn samples_left_out_must_fit_the_film() {
         .flat_map(|n| n.to_le_bytes())
         .collect();
     for (changed, says) in [
-        ([300u64, 1, 1, 0, 2, 0], "names pixel (300, 1) out of place"),
-        ([3, 1, u64::MAX, 0, 2, 0], "more samples than there can be"),
+        ([300u64, 1, 1, 0, 2, 0], "lists pixel (300, 1) out of order"),
+        ([3, 1, u64::MAX, 0, 2, 0], "with too many samples"),
         (
             [3, 1, 1 << 40, 0, 2, 0],
             "pixel (3, 1) leaves out more samples than it has",
         ),
-        ([3, 1, 0, 0, 2, 0], "pixel (3, 1) counts"),
+        ([3, 1, 0, 0, 2, 0], "pixel (3, 1) has a count of"),
     ] {
         let mut bytes = good.clone();
         let new: Vec<u8> = changed.iter().flat_map(|n| n.to_le_bytes()).collect();

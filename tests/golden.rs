@@ -1,6 +1,6 @@
 //! Pictures as they should look: of every scene up to its noise, and as PNG for what statistics do not see: orientation,
 //! tone curve, colour order.
-//! `ETENDUE_BLESS=1 cargo test --release --test golden` makes them anew.
+//! `ETENDUE_BLESS=1 cargo test --release --test golden` re-creates them.
 
 mod common;
 
@@ -53,7 +53,7 @@ fn check(name: &str) {
     println!("{name}: mean FLIP {:.5}", found.metrics.flip);
     assert!(
         found.same(),
-        "{name}: {:?}; if that is meant, ETENDUE_BLESS=1 makes {} anew",
+        "{name}: {:?}; if this is intended, ETENDUE_BLESS=1 re-creates {}",
         found.exceeded,
         golden.display()
     );

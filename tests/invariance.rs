@@ -209,7 +209,7 @@ fn everything() -> Scene {
     build.0
 }
 
-/// Surfaces of every kind in one place, whose order decides what is seen.
+/// Coinciding surfaces of every kind, whose order decides which one rays meet.
 fn coincident() -> Scene {
     let mut s = Build::new(v(0.0, 1.2, 2.5), v(0.0, 0.3, 0.0), 60.0)
         // By rank, which is their order: planes, disks, cylinders, spheres, each in one place.
@@ -269,7 +269,7 @@ fn same_in_any_order(s: &Scene) {
 }
 
 #[test]
-fn order_and_names_touch_no_bit() {
+fn order_and_names_change_no_bit() {
     same_in_any_order(&everything());
     for name in ["three_materials", "several_lights"] {
         let mut s = named_scene(name);

@@ -1,4 +1,4 @@
-//! What the kernels of `scenes/` contain, held against a table: a guard against careless changes that is no clock.
+//! Compares the contents of the kernels of `scenes/` with a table. This detects unintended changes without timing anything.
 //!
 //! Counted is the loop of the entry point, with every function that it calls in the place of the call, as the drivers'
 //! compilers have it: what a path pays for at every vertex. The table is `tests/kernel_counts.txt`. A change that is
@@ -225,7 +225,7 @@ fn parse(text: &str) -> BTreeMap<String, Counts> {
     assert_eq!(
         head[1..],
         KINDS,
-        "the table has other columns; make it anew"
+        "the table has other columns; re-create it"
     );
     lines
         .map(|line| {
@@ -330,7 +330,7 @@ fn a_small_kernel_is_counted_right() {
 }
 
 #[test]
-fn differences_are_told_with_numbers() {
+fn differences_are_reported_with_numbers() {
     let counts = |loads: u64, arithmetic: u64| {
         let counts = Counts::from([("buffer-loads", loads), ("arithmetic", arithmetic)]);
         BTreeMap::from([("box/baked".to_owned(), counts)])

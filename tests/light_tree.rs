@@ -1,32 +1,33 @@
-//! The tree that many lights are chosen from: its pictures against the CPU reference, which looks at every light for every
-//! choice, and its probabilities one by one.
+//! The light tree: compares its pictures with the CPU reference, which weighs every light for every choice, and checks its
+//! probabilities one by one.
 //!
-//! Direct light alone, in which every path chooses a light and some meet one by chance: whatever is wrong with the choice, or
-//! with what it is weighed against, is in the picture undiluted; the mean of the picture is known to 0.2 %.
+//! The pictures have only direct light. Every path chooses a light there, and some hit one without light sampling, so every
+//! error in the choice or in its weights fully affects the picture. The mean of the picture is known to 0.2 %.
 //!
-//! Faults that these tests have been seen to catch, each put into the shaders for a try:
+//! We tried these faults in the shaders, and the tests detect them:
 //!
-//! - by picture and probabilities: the probability said of the first half of all lights too large by 2 %; first halves chosen
-//!   too often by 2 %, or by 4 % in the last level alone; halves mistaken for each other in the look-up; the fourth light of
-//!   a cluster never chosen;
-//! - by the picture alone: lights met by chance weighed with one and a half times their probability, or with 1 % for each;
-//!   diffuse surfaces' light samples not weighed at all;
-//! - by the probabilities alone, for a quarter of a per cent of the picture at most is in it: one cluster in eight with a
-//!   probability wrong by 2 %; clusters taken for dark at cosines below 0.15, of lamps, of the receiver or of both; balls of
-//!   clusters too small by 0.3 of their radius; cones too narrow by 0.2 in the cosine, or left out.
+//! - by picture and probabilities: the stated probability of the first half of all lights is 2 % too large; first halves are
+//!   chosen 2 % too often, or 4 % in the last level only; halves are swapped in the look-up; the fourth light of
+//!   a cluster is never chosen;
+//! - only by the picture: lights hit without light sampling are weighted with 1.5 times their probability, or with 1 % for each;
+//!   light samples on diffuse surfaces are not weighted at all;
+//! - only by the probabilities, since they change the picture by at most 0.25 %: one cluster in eight has a
+//!   probability wrong by 2 %; clusters count as dark at cosines below 0.15, of lamps, of the receiver or of both; bounding
+//!   balls of clusters are too small by 0.3 of their radius; cones are too narrow by 0.2 in the cosine, or left out.
 //!
-//! Not seen: lights met by chance weighed with 0.98 of their probability, which moves the picture by a thousandth.
+//! Not detected: lights hit without light sampling are weighted with 0.98 of their probability, which changes the picture by
+//! 0.1 %.
 
 mod common;
 
 use common::{block_means, cpu, film, scene, settings, worst_t};
 use etendue::gpu::probe::{Probe, UNWRITTEN, Uniform, Values};
 use etendue::gpu::{Choice, Gpu, GpuEngine};
-use etendue::kernel::{Access, MOST_LOOKED_AT, scene_probe_source};
+use etendue::kernel::{Access, scene_probe_source};
 use etendue::reference::Estimator;
 use etendue::scene::Scene;
 use etendue::settings::{LightParts, Settings};
-use etendue::world::{Geometry, World};
+use etendue::world::{Geometry, MOST_LOOKED_AT, World};
 use glam::DVec3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
@@ -235,8 +236,8 @@ fn probe(
     out
 }
 
-/// How a receiver scatters: where it mirrors the eye, its diffuse and specular shares, an eighth of its exponent. Two in five are
-/// diffuse, the others glossy, from dull to almost a mirror, of which a third are nothing but that.
+/// The material of a receiver: the mirror direction of the eye, diffuse and specular reflectance, an eighth of the exponent.
+/// Two in five are diffuse. The others are glossy, from dull to almost a mirror; a third of these have no diffuse part.
 fn gloss([p, n]: [DVec3; 2]) -> [f64; 6] {
     let mut r = Uniform(p.x.to_bits() ^ p.z.to_bits().rotate_left(21));
     let (kind, share) = ([(); 4].map(|()| r.next())[3], r.next());
@@ -265,8 +266,8 @@ fn input(at: [DVec3; 2], rest: [f64; 3]) -> Values {
     x
 }
 
-/// What the tree says a light's probability is, for every light at every receiver: none is lost that can send anything there, and all
-/// together are no more than 1.
+/// Checks the tree's probability of every light at every receiver: it is positive for every light that can contribute, and the
+/// sum is at most 1.
 #[test]
 fn no_light_is_lost() {
     let (gpu, hall) = (gpu(), hall());
@@ -282,7 +283,7 @@ fn no_light_is_lost() {
         &gpu,
         &world,
         &settings,
-        "y[0] = light_probability(u32(x[6]), p, at);",
+        "y[0] = light_probability(u32(x[6]), light_at(u32(x[6])), p, at, 0.0);",
         &inputs,
     );
     let mut sending = 0;
@@ -306,10 +307,10 @@ fn no_light_is_lost() {
     assert!(sending > inputs.len() / 5, "{sending} of {}", inputs.len());
 }
 
-/// Every light is chosen as often as is said of it, by the choice itself and to paths that meet it by chance; nothing is chosen
-/// as often as is left.
+/// Every light is chosen with its stated probability, both the one that the choice returns and the one for paths that hit the
+/// light without light sampling. The choice returns no light with the remaining probability.
 #[test]
-fn lights_are_chosen_as_often_as_said() {
+fn lights_are_chosen_with_the_stated_probability() {
     const TIMES: usize = 4096;
     let (gpu, hall) = (gpu(), hall());
     let settings = direct(&hall, 0);
@@ -325,8 +326,8 @@ fn lights_are_chosen_as_often_as_said() {
     let body = "
         let chosen = choose_light(p, at, vec2f(x[7], x[8]));
         y[0] = select(f32(chosen.index), -1.0, chosen.inverse_probability == 0.0);
-        y[1] = chosen.inverse_probability * light_probability(chosen.index, p, at);
-        y[2] = light_probability(u32(x[6]), p, at);";
+        y[1] = chosen.inverse_probability * light_probability(chosen.index, chosen.light, p, at, chosen.weights);
+        y[2] = light_probability(u32(x[6]), light_at(u32(x[6])), p, at, 0.0);";
     let out = probe(&gpu, &world, &settings, body, &inputs);
     // By light, and last of all nothing: how often it was chosen, and was to be, and the variance of that.
     let mut counts = vec![[0.0; 3]; lights + 1];

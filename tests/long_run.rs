@@ -14,7 +14,7 @@ const SIZE: [u32; 2] = [4, 4];
 /// Rate of false alarms over all comparisons together (Bonferroni).
 const FALSE_ALARM: f64 = 1e-4;
 
-/// Powers of two of the samples a pixel at which the mean is looked at.
+/// Powers of two of the samples per pixel at which the mean is looked at.
 const POWERS: std::ops::RangeInclusive<u32> = 10..=20;
 
 /// What the largest standard error of the whole run's mean may be, of the mean. Four replicates of sixteen pixels tell the error
@@ -58,7 +58,7 @@ fn p_value(difference: f64, [a, b]: [&Mean; 2], weights: [f64; 2]) -> f64 {
 }
 
 #[test]
-fn a_million_samples_say_what_a_thousand_say() {
+fn a_million_samples_agree_with_a_thousand() {
     let s = named_scene("diffuse");
     let settings = settings(&s, SIZE, 0);
     let mut engine = gpu(&s, &settings, None);

@@ -1,9 +1,9 @@
-//! Light by way of mirror balls, for which paths are sent, against the CPU reference, which meets it by chance: Welch's t on
-//! blocks of the picture and on the whole. And that this sees light counted twice, or by a wrong density.
+//! Light reflected by mirror balls, to which the kernel sends paths, compared with the CPU reference, which does not: Welch's
+//! t on blocks of the picture and on the whole. Also checks that this test detects light counted twice, and a wrong density.
 //!
-//! Indirect light of paths of three vertices alone, in a dark room: most of it then comes by way of the balls. All light
-//! together is compared in agreement.rs, where a fault of this part is lost in the noise; smaller faults of the density are the business of
-//! probes/images.rs.
+//! Renders only the indirect light of paths with three vertices, in a dark room, so that most of it comes from the balls.
+//! agreement.rs compares all light together, where an error in this part is hidden by noise. probes/images.rs detects smaller
+//! errors of the density.
 
 mod common;
 
@@ -140,7 +140,7 @@ fn the_room_is_as_bright_as_the_reference_says() {
 }
 
 #[test]
-fn light_counted_twice_is_seen() {
+fn light_counted_twice_is_detected() {
     let p = p(&kernel(Access::Baked, |k| {
         replace(k, "memory < BY_MIRROR || !image", "true");
     }));
@@ -148,9 +148,9 @@ fn light_counted_twice_is_seen() {
 }
 
 #[test]
-fn a_density_wrong_by_a_fifth_is_seen() {
+fn a_density_wrong_by_a_fifth_is_detected() {
     let p = p(&kernel(Access::Baked, |k| {
-        replace(k, "3.14159265 * radius * radius", "3.77 * radius * radius");
+        replace(k, "PI * radius * radius", "3.77 * radius * radius");
     }));
     assert!(p < FALSE_ALARM, "p = {p}");
 }

@@ -1,4 +1,4 @@
-//! Pictures: what is written is there, for our own reader and for others', and no damaged file hurts.
+//! Pictures: our reader and others read back what was written, and damaged files give errors.
 
 mod output_support;
 
@@ -213,7 +213,7 @@ fn other_kinds_of_files_are_refused() {
         let error = format
             .write(&nowhere, &film, &described(&film), 0.0)
             .unwrap_err();
-        assert!(error.to_string().contains("there is no folder"), "{error}");
+        assert!(error.to_string().contains("no such folder"), "{error}");
     }
 }
 

@@ -77,7 +77,9 @@ impl Folder {
     fn bless(&self) {
         self.run(&["--bless", "--power", "5%"])
             .code(0)
-            .stdout(contains("24x18").and(contains("sees a change of all light by")));
+            .stdout(contains("24x18").and(contains(
+                "detects a change of the whole picture's brightness by",
+            )));
     }
 }
 
@@ -103,9 +105,9 @@ fn render(text: &str, seed: u32, samples: u64) -> (Film, Provenance) {
 #[test]
 fn goldens_are_made_and_pass_with_another_seed() {
     let f = Folder::new(&["one", "two"]);
-    f.run(&[])
-        .code(1)
-        .stdout(contains("new  one: no ").and(contains("2 scenes: 2 new")));
+    f.run(&[]).code(1).stdout(
+        contains("one.exr does not exist; create it with --bless").and(contains("2 scenes: 2 new")),
+    );
     f.bless();
     let (junit, html) = (f.path("r.xml"), f.path("r.html"));
     let flags = [
@@ -116,9 +118,9 @@ fn goldens_are_made_and_pass_with_another_seed() {
         "--jobs",
         "2",
     ];
-    f.run(&flags).code(0).stdout(
-        contains("passed  one: the same up to their noise").and(contains("2 scenes: 2 passed")),
-    );
+    f.run(&flags)
+        .code(0)
+        .stdout(contains("passed  one: equal up to noise").and(contains("2 scenes: 2 passed")));
     let xml = std::fs::read_to_string(junit).expect("written");
     assert!(
         xml.contains("tests=\"2\"") && xml.contains("failures=\"0\""),
@@ -130,7 +132,7 @@ fn goldens_are_made_and_pass_with_another_seed() {
     f.run(&["--filter", "wo"])
         .code(0)
         .stdout(contains("1 scene: 1 passed").and(contains("one").not()));
-    // Enough samples for what was asked, and not many more.
+    // Enough samples for --power, and not many more.
     let power = |flag: &str| {
         f.run(&["--bless", "--filter", "one", "--power", flag])
             .code(0);
@@ -142,7 +144,7 @@ fn goldens_are_made_and_pass_with_another_seed() {
 }
 
 #[test]
-fn what_differs_leaves_film_and_report() {
+fn failures_leave_a_film_and_a_report() {
     let f = Folder::new(&["one", "two"]);
     f.bless();
     // A golden of the same hash, but of a brighter lamp: the renderer has changed, not the scene.
@@ -214,7 +216,7 @@ fn bad_input_never_passes() {
 }
 
 #[test]
-fn broken_scenes_are_named_before_they_have_a_golden() {
+fn invalid_scenes_are_named_even_without_a_golden() {
     let f = Folder::new(&["good"]);
     f.put("bad", "nonsense");
     std::fs::create_dir(f.path("folder.toml")).expect("made");
@@ -222,7 +224,10 @@ fn broken_scenes_are_named_before_they_have_a_golden() {
         .code(2)
         .stdout(contains("unusable  bad: ").and(contains("bad.toml:1:")))
         .stdout(contains("folder.toml: cannot read: is a directory"))
-        .stdout(contains("new  good: no ").and(contains("3 scenes: 1 new, 2 unusable")));
+        .stdout(
+            contains("good.exr does not exist; create it with --bless")
+                .and(contains("3 scenes: 1 new, 2 unusable")),
+        );
     // Each stands in one list alone, and a quiet run says nothing else.
     let done = f.run(&["--quiet"]);
     let done = done.get_output();
@@ -232,30 +237,30 @@ fn broken_scenes_are_named_before_they_have_a_golden() {
 }
 
 #[test]
-fn goldens_have_no_more_samples_than_they_may_and_weak_ones_are_warned_of() {
+fn goldens_respect_max_spp_and_warn_if_they_are_noisy() {
     let f = Folder::new(&["one"]);
     f.run(&["--bless", "--max-spp", "8"])
         .code(0)
-        .stdout(contains("8 samples a pixel"))
-        .stderr(contains("warning: one: ").and(contains(
-            "1.00 % was wanted: --max-spp allows no more samples",
-        )));
+        .stdout(contains("8 samples per pixel"))
+        .stderr(
+            contains("warning: one: ").and(contains("--power asks for 1.00 %; raise --max-spp")),
+        );
     let picture = read_exr(&f.golden("one.exr")).expect("a golden");
     assert_eq!(picture.samples.expect("counts")[0], 8);
     f.run(&[]).code(0);
     f.run(&["--bless", "--max-spp", "7"])
         .code(2)
         .stdout(contains(
-            "a golden of this scene takes 8 samples a pixel or more",
+            "a golden of this scene needs at least 8 samples per pixel",
         ));
-    // What is asked of goldens is no matter where none are made.
+    // Flags for creating goldens need --bless.
     for flags in [["--max-spp", "8"], ["--power", "2%"], ["--size", "8x8"]] {
         f.run(&flags).code(2).stderr(contains("--bless"));
     }
 }
 
 #[test]
-fn no_adapter_is_no_verdict() {
+fn without_an_adapter_there_is_no_verdict() {
     let f = Folder::new(&["one"]);
     f.bless();
     let regress = |flags: &[&str]| {

@@ -66,7 +66,7 @@ fn go(
 }
 
 #[test]
-fn cuts_tiles_and_regions_touch_no_bit() {
+fn cuts_tiles_and_regions_change_no_bit() {
     let scene = three_materials();
     for strata in [1, 2, 3] {
         let settings = settings(&scene, strata);
@@ -87,7 +87,7 @@ fn cuts_tiles_and_regions_touch_no_bit() {
         assert_eq!(once.partial(), cut.partial(), "strata {strata}");
         assert_eq!(counted, again, "strata {strata}");
 
-        // A fresh engine goes on where another stopped.
+        // A new engine resumes where another stopped.
         let mut resumed = film();
         go(&mut engine, &mut resumed, WHOLE, 0..100, &[33]);
         go(

@@ -1,4 +1,4 @@
-//! The JSON Schema of scene files against the parser: what it accepts and what it rejects.
+//! Compares the JSON Schema of scene files with the parser: both must accept and reject the same files.
 
 use etendue::scene::hash::scene_hash;
 use etendue::scene::parse::parse_str;
@@ -157,7 +157,7 @@ fn to_json(text: &str) -> Value {
 }
 
 #[test]
-fn valid_scenes_satisfy_it() {
+fn valid_scenes_satisfy_the_schema() {
     for text in [SMALL, LARGE] {
         assert!(parse_str(Path::new("x.toml"), text).is_ok());
         assert!(valid(&schema(), &to_json(text)));
@@ -165,7 +165,7 @@ fn valid_scenes_satisfy_it() {
 }
 
 #[test]
-fn what_it_rejects_the_parser_rejects() {
+fn the_parser_rejects_what_the_schema_rejects() {
     for (old, new) in [
         ("vfov = 179.5", "vfov = 180"),
         ("vfov = 179.5", "vfov = '42'"),
@@ -245,7 +245,11 @@ fn rows_of_spheres_and_lights_stand_for_tables() {
     assert_eq!(hash(&rows), hash(&tables));
 
     for (old, new, fault) in [
-        ("file = 'points.csv'\n", "", "[[spheres]] lacks file"),
+        (
+            "file = 'points.csv'\n",
+            "",
+            "missing key file in [[spheres]]",
+        ),
         ("points.csv", "no.csv", "cannot read"),
         ("'white'", "'wite'", "did you mean \"white\"?"),
         (
@@ -262,7 +266,7 @@ fn rows_of_spheres_and_lights_stand_for_tables() {
 
 /// Defaults satisfy their own rules, and every key has a text to show.
 #[test]
-fn it_is_complete_for_editors() {
+fn the_schema_is_complete_for_editors() {
     fn walk(schema: &Value, defaults: &mut usize) {
         let properties = schema["properties"].as_object();
         for (key, property) in properties.into_iter().flatten() {

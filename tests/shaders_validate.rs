@@ -142,20 +142,32 @@ fn every_mode_is_valid() {
 
 #[test]
 fn a_kernel_holds_only_what_its_scene_needs() {
-    let scene = scene(&text(2, 1, 1, false).expect("has primitives"));
-    let settings = Settings::resolve(&scene, &Overrides::default());
-    let wgsl = compose(&World::new(&scene, settings.size), &settings, None).wgsl;
-    for absent in [
-        "fn cylinder",
-        "fn sphere",
-        "fn huge",
-        "fn refract",
-        "fn mirrored",
-        "fn phong",
+    let kernel = |text: Option<String>, access| {
+        let scene = scene(&text.expect("has primitives"));
+        let settings = Settings::resolve(&scene, &Overrides::default());
+        compose(&World::new(&scene, settings.size), &settings, access).wgsl
+    };
+    let plane = kernel(text(2, 1, 1, false), None);
+    let everything = [Access::Baked, Access::Buffers, Access::Tree]
+        .map(|access| kernel(text(31, 15, 3, false), Some(access)))
+        .concat();
+    for unneeded in [
+        "fn cylinder_",
+        "fn sphere_",
+        "fn huge_sphere_",
+        "fn sample_mirror",
+        "fn sample_dielectric",
+        "fn sample_phong",
         "fn light_weight",
-        "pdf: f32,\n    // Normal there",
+        "var<storage, read> surfaces",
+        "var records",
+        "trips_left",
     ] {
-        assert!(!wgsl.contains(absent), "a diffuse plane needs no {absent}");
+        assert!(everything.contains(unneeded), "no kernel has {unneeded}");
+        assert!(
+            !plane.contains(unneeded),
+            "a diffuse plane needs no {unneeded}"
+        );
     }
-    assert!(wgsl.contains("plane_front") && wgsl.contains("sample_cosine"));
+    assert!(plane.contains("plane_front") && plane.contains("sample_diffuse"));
 }

@@ -1,5 +1,5 @@
-//! A picture asked for an error has it: how often the true error, against a long reference, exceeds what was asked for by
-//! more than a tenth.
+//! The stop condition `--error`: how often the true error, measured against a long reference, exceeds the requested one by
+//! more than 10 %.
 //!
 //! The full measurement, a hundred runs of every scene (an hour on two cores):
 //! `cargo test --release --test stopping -- --ignored --nocapture`
@@ -21,7 +21,7 @@ struct Case {
     size: [u32; 2],
     /// The error asked for.
     target: f64,
-    /// Samples a pixel of the reference: some thirty times what a run takes.
+    /// Samples per pixel of the reference: some thirty times what a run takes.
     reference: u64,
 }
 
@@ -103,7 +103,7 @@ fn stopped_early(case: &Case, runs: u32) -> usize {
     let percentile = |p: usize| errors[p * (errors.len() - 1) / 100] * 100.0;
     println!(
         "{}, {} x {}, asked for {:.1} %: {early} of {runs} above {:.1} %; true error {:.2} % (median), {:.2} % (95 of 100), \
-         {:.2} % (largest), stated {:.2} % (mean); {} to {} samples a pixel; reference {:.2} %",
+         {:.2} % (largest), stated {:.2} % (mean); {} to {} samples per pixel; reference {:.2} %",
         case.name,
         case.size[0],
         case.size[1],
@@ -127,7 +127,7 @@ const DIFFUSE: Case = Case {
     reference: 48_000,
 };
 
-/// Glossy, and the hardest of them: light that comes by way of two glossy things is rare and bright.
+/// Glossy, and the hardest scene: light over two glossy reflections comes in rare bright samples.
 const GLOSSY: Case = Case {
     name: "phong_gallery",
     size: [32, 24],

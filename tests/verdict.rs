@@ -178,7 +178,7 @@ struct Fault {
     kernel: Option<(&'static str, String)>,
 }
 
-/// `size` 1: the faults that are to be seen at 128 x 96 pixels; others are so many times as large.
+/// Faults that must be detected at 128 x 96 pixels for `size` 1. For other values they are larger by this factor.
 ///
 /// Half a pixel at the blue sphere's distance of 5.9 is 2 · 5.9 · tan(20.5°) / 96 / 2 = 0.023. A pixel's width at the
 /// middle of the diffuse box, 5 away, is 2 · 5 · tan(18°) / 96 = 0.034.
@@ -192,8 +192,8 @@ fn faults(size: f64) -> Vec<Fault> {
             scene: "diffuse",
             text: None,
             kernel: Some((
-                "Ray(v.p, to.d, face",
-                format!("Ray(v.p + {out} * n, to.d, face"),
+                "Ray(x.p, wi.d, x.face",
+                format!("Ray(x.p + {out} * x.n, wi.d, x.face"),
             )),
         },
         Fault {

@@ -1,25 +1,25 @@
 #!/usr/bin/env bash
-# One picture by many tasks of a Slurm cluster: a job array in which every task renders its own range of sample
-# numbers into its own film, and a job that merges the films when all of them are done.
+# Renders one picture on a Slurm cluster. Each task of a job array renders its own range of samples into its own
+# film, and a final job merges the films.
 #
 #     scripts/slurm/render.sh SCENE OUT TASKS SAMPLES [SBATCH OPTION...] [-- RENDER FLAG...]
 #
 #     scripts/slurm/render.sh scene.toml out 64 65536 --time=4:00:00 --cpus-per-task=8 -- --size 1920x1080
 #
 # SCENE     the scene file
-# OUT       a folder that every node sees; films go to OUT/parts, the result is OUT/whole.npz, .exr and .png
-# TASKS     tasks in the array
-# SAMPLES   samples a pixel in all. Every task gets a whole number of blocks of 256, so that the merged film equals
-#           that of a single run to 1e-12; the last one takes what is left.
+# OUT       a folder on a file system shared by all nodes; films go to OUT/parts, results to OUT/whole.npz, .exr and .png
+# TASKS     number of tasks in the array
+# SAMPLES   total samples per pixel. Every task gets a whole number of blocks of 256 (the last one gets the rest), so that
+#           the merged film equals that of a single run to 1e-12.
 #
-# SBATCH OPTIONs (partition, memory, gres, time) go to the array, RENDER FLAGs to `etendue render`. ETENDUE names the
-# program if it is not on the path. Prints the numbers of the array and of the merge job.
+# SBATCH OPTIONs (partition, memory, gres, time) are passed to the array, RENDER FLAGs to `etendue render`. Set ETENDUE to
+# the program if it is not on the path. Prints the job numbers of the array and of the merge job.
 #
-# A task that is killed or preempted and requeued goes on from its own film, and so does everything when the same command
-# is given again: tasks that were done are done at once. Slurm sends SIGTERM before it kills, on which the film is saved;
-# without it at most a minute is lost (--checkpoint). For a warning before the time is over: --signal=B:TERM@60.
-# The merge waits for all tasks and is dropped when one fails for good (its log says why); give the command again once
-# the cause is gone. OUT/whole.npz is made anew each time, from the films in OUT/parts.
+# A task that is killed or preempted and requeued resumes its own film. Running the same command again resumes all tasks;
+# finished ones end at once. Slurm sends SIGTERM before it kills a task, and the task then saves its film. Without SIGTERM
+# at most a minute is lost (--checkpoint). To get SIGTERM before the time limit: --signal=B:TERM@60.
+# The merge job waits for all tasks, and is cancelled if one fails (its log says why). Run the command again after fixing the
+# cause. OUT/whole.npz is re-created each time from the films in OUT/parts.
 set -euo pipefail
 
 usage() {
@@ -28,7 +28,7 @@ usage() {
     exit 2
 }
 number() { # name value
-    [[ $2 =~ ^[1-9][0-9]{0,9}$ ]] || usage "$1 is a whole number from 1, not \"$2\""
+    [[ $2 =~ ^[1-9][0-9]{0,9}$ ]] || usage "$1 is \"$2\", but must be a whole number of at least 1"
 }
 
 # Sample numbers and film of a task: range OUT TASKS SAMPLES TASK sets first, end, part.
@@ -41,19 +41,19 @@ range() {
     part=$(printf '%s/parts/%08d-%08d' "$1" "$first" "$end")
 }
 
-# The jobs themselves, to which sbatch gives a copy of this file.
+# The jobs: sbatch runs a copy of this file.
 case ${1-} in
 --task)
     etendue=$2 scene=$3 out=$4 tasks=$5 samples=$6
     shift 6
     range "$out" "$tasks" "$samples" "$SLURM_ARRAY_TASK_ID"
-    # Two at a time would overwrite each other's work: an older task may take a while to die.
+    # Two processes would overwrite each other's film: a requeued task may start while the old one is still ending.
     exec 9>"$part.lock"
     flock --timeout 120 9 || {
-        echo "another task is at work on $part.npz" >&2
+        echo "another task is rendering $part.npz" >&2
         exit 1
     }
-    # exec: Slurm's signals are for the program, which saves its film.
+    # exec: Slurm's signals must reach the program, which then saves its film.
     exec "$etendue" render "$scene" --samples "$first..$end" --film "$part.npz" --output "$part.png" \
         --progress plain --threads "${SLURM_CPUS_ON_NODE:-1}" "$@"
     ;;
@@ -64,7 +64,7 @@ case ${1-} in
         range "$out" "$tasks" "$samples" "$task"
         films+=("$part.npz")
     done
-    # `merge` never replaces a film, so a new one is made beside the old and renamed.
+    # `merge` never overwrites a film, so write a new one beside the old one and rename it.
     rm -f "$out/merging.npz"
     "$etendue" merge "$out/merging.npz" "${films[@]}"
     mv "$out/merging.npz" "$out/whole.npz"
@@ -73,7 +73,7 @@ case ${1-} in
 -h | --help) usage 2>&1 ;;
 esac
 
-[ $# -ge 4 ] || usage "SCENE, OUT, TASKS and SAMPLES are needed"
+[ $# -ge 4 ] || usage "missing arguments: SCENE, OUT, TASKS and SAMPLES are required"
 scene=$1 out=$2 tasks=$3 samples=$4
 shift 4
 number TASKS "$tasks"
@@ -88,12 +88,12 @@ done
 [ $# = 0 ] || shift
 [ -r "$scene" ] || usage "cannot read the scene $scene"
 etendue=$(command -v "${ETENDUE:-etendue}") ||
-    usage "no program ${ETENDUE:-etendue}: put it on the path, or name it in ETENDUE"
-command -v sbatch >/dev/null || usage "no sbatch here: this is for a Slurm cluster"
+    usage "${ETENDUE:-etendue} not found: put it on the path, or set ETENDUE"
+command -v sbatch >/dev/null || usage "sbatch not found: run this on a Slurm cluster"
 "$etendue" check "$scene" >/dev/null
 
 mkdir -p "$out/parts" "$out/log"
-# Jobs start elsewhere: they get absolute names.
+# Jobs start in another folder, so they need absolute paths.
 etendue=$(realpath "$etendue") scene=$(realpath "$scene") out=$(realpath "$out")
 array=$(sbatch --parsable --job-name=etendue --array="0-$((tasks - 1))" --requeue --open-mode=append \
     --output="$out/log/part-%a.txt" ${options[@]+"${options[@]}"} \

@@ -1,4 +1,4 @@
-//! The engines that can be held against each other.
+//! The engines that a benchmark can compare.
 
 use crate::engine::{DeviceInfo, Engine, EngineError, tile_pixels};
 use crate::film::Film;
@@ -17,7 +17,7 @@ use std::time::Instant;
 /// Which engine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum EngineKind {
-    /// The kernel with the scene's values in its text.
+    /// The kernel with the scene's values as constants.
     GpuBaked,
     /// The kernel that reads them from buffers.
     GpuBuffers,
@@ -25,7 +25,7 @@ pub enum EngineKind {
     GpuTree,
     /// The f64 reference with light sampling.
     Cpu,
-    /// The f64 reference that finds lights by chance alone.
+    /// The f64 reference without light sampling.
     CpuBrute,
 }
 
@@ -70,7 +70,7 @@ impl EngineKind {
     }
 }
 
-/// An engine made ready for a scene.
+/// An engine prepared for a scene.
 pub struct Contender {
     /// Which one.
     pub kind: EngineKind,
@@ -79,7 +79,7 @@ pub struct Contender {
     pub tiles: Vec<Rect>,
     /// Seconds that making and compiling the kernel took; 0 on the CPU.
     pub compile_seconds: f64,
-    /// Seconds that the first sample of every pixel took, with what is made and paged in for it.
+    /// Seconds for the first sample of every pixel, including one-time allocations.
     pub warm_up_seconds: f64,
 }
 
@@ -88,7 +88,7 @@ enum Either {
     Cpu(Box<Cpu>),
 }
 
-/// The reference, and what it is made of: it has no other way to another seed than to be made anew.
+/// The reference, with the scene and settings: for another seed it must be created again.
 struct Cpu {
     world: World,
     settings: Settings,
@@ -108,8 +108,7 @@ impl Cpu {
 }
 
 impl Contender {
-    /// Makes an engine, and lets it render a sample of every pixel that nobody looks at. `gpu` is there for engines
-    /// that need one.
+    /// Makes an engine and warms it up with one sample of every pixel. `gpu` must be given for engines that need it.
     pub fn new(
         kind: EngineKind,
         gpu: Option<&Arc<Gpu>>,
@@ -180,7 +179,7 @@ impl Contender {
         }
     }
 
-    /// Goes on with another seed.
+    /// Changes the seed of later samples.
     pub fn reseed(&mut self, seed: u32) {
         match &mut self.engine {
             Either::Gpu(engine) => engine.reseed(seed),
@@ -194,8 +193,8 @@ impl Contender {
         }
     }
 
-    /// What fixes the values of its samples beside scene, settings and seed: kernel, adapter and driver, or the
-    /// reference's own version.
+    /// Everything besides scene, settings and seed that determines the values of its samples: kernel, adapter and driver, or
+    /// the reference's version.
     pub fn identity(&self) -> String {
         let made_by: String = match &self.engine {
             Either::Gpu(engine) => {
@@ -207,7 +206,7 @@ impl Contender {
         let device = self.device();
         let mut parts = vec![self.kind.name(), &device.name, &device.driver, &made_by];
         if !self.kind.on_gpu() {
-            // How many threads the reference has is no matter.
+            // The reference's number of threads does not matter.
             parts.remove(2);
         }
         parts.join("; ")
@@ -217,7 +216,7 @@ impl Contender {
 /// Why an engine is not ready.
 #[derive(Debug, thiserror::Error)]
 pub enum Unready {
-    /// There is none for this scene.
+    /// The engine does not support this scene.
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// It failed, or was stopped.

@@ -1,4 +1,4 @@
-//! How far a picture is from a reference, and how far it says it is.
+//! The error of a picture: measured against a reference, and as the picture states it.
 
 use crate::compare::{Picture, flip};
 use crate::film::Film;
@@ -7,7 +7,7 @@ use crate::stats::luminance;
 /// Share of the pixels that the trimmed error leaves out.
 pub const TRIMMED: f64 = 0.001;
 
-/// What pictures are held against.
+/// The picture that others are compared with.
 #[derive(Debug, Clone)]
 pub struct Truth {
     /// Width and height in pixels.
@@ -22,8 +22,8 @@ pub struct Truth {
     floor: f64,
 }
 
-/// Distances from the truth. What the reference's own noise adds to a square on average is subtracted, so a single
-/// one may come out below 0 where the picture is nearly as good as the reference.
+/// Differences from the reference. The expected contribution of the reference's own noise is subtracted from squares, so a
+/// value can be negative if the picture is nearly as good as the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
     /// Mean over pixels and channels of the squared difference, in units of radiance squared.
@@ -33,7 +33,7 @@ pub struct Errors {
     pub relative_mse: f64,
     /// The same without the worst [`TRIMMED`] of the pixels.
     pub trimmed_relative_mse: f64,
-    /// Mean [FLIP](flip) of the pictures as a screen shows them; the reference's noise is in it.
+    /// Mean [FLIP](flip) of the pictures as a screen shows them. The reference's noise is not subtracted.
     pub flip: f64,
     /// Mean over pixels and channels of the squared standard errors that the picture states; `None` while some pixel
     /// has fewer than two replicates.
@@ -43,12 +43,12 @@ pub struct Errors {
 }
 
 impl Truth {
-    /// A picture as the truth. The error says why it will not do.
+    /// A picture as the reference. The error says why it can't be used.
     pub fn new(picture: &Picture) -> Result<Self, String> {
         if let Some(i) = picture.covered.iter().position(|covered| !covered) {
             let (x, y) = (i as u32 % picture.size[0], i as u32 / picture.size[0]);
             return Err(format!(
-                "pixel ({x}, {y}) has no samples; a reference is a whole picture"
+                "pixel ({x}, {y}) has no samples; a reference must be a whole picture"
             ));
         }
         let n = picture.rgb.len() as f64;
@@ -75,7 +75,7 @@ impl Truth {
         Some((sum / self.rgb.len() as f64).sqrt())
     }
 
-    /// What a pixel's noise adds to its relative squared difference.
+    /// The contribution of a pixel's noise to its relative squared difference.
     fn relative_noise(&self, i: usize) -> f64 {
         over(self.variance[i][3], self.weight(i))
     }
@@ -126,7 +126,7 @@ impl Truth {
     }
 }
 
-/// a / b, and 0 where nothing is divided by nothing: a black picture is right about itself.
+/// a / b, and 0 for 0 / 0: the error of a black picture is 0.
 fn over(a: f64, b: f64) -> f64 {
     if a == 0.0 { 0.0 } else { a / b }
 }
@@ -156,7 +156,7 @@ mod tests {
         }
     }
 
-    /// A film of 8 samples a pixel with two replicates of equal means: pixel i has `value(i)`, and states no error.
+    /// A film of 8 samples per pixel with two replicates of equal means: pixel i has `value(i)`, and states no error.
     fn film(value: impl Fn(usize) -> f64) -> Film {
         let rect = Rect::whole(SIZE);
         let mut coverage = Coverage::default();
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_known_pair_has_the_errors_worked_out_by_hand() {
+    fn errors_of_a_known_pair() {
         let truth = Truth::new(&grey(0.5, None)).unwrap();
         // One pixel in four hundred is 2.5 off, the others 0.1.
         let e = truth.errors(&film(|i| if i % 400 == 0 { 3.0 } else { 0.6 }));

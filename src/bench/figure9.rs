@@ -1,7 +1,7 @@
 //! The report's Figure 9: seconds for 1, 32, 128 and 256 rays per pixel-sample, in four settings.
 //!
-//! A pixel-sample is a stratum, so N rays are strata² × N samples a pixel. Nothing is extrapolated: what was not
-//! rendered has no number.
+//! A pixel-sample is a stratum, so N rays are strata² × N samples per pixel. Nothing is extrapolated: cells that were not
+//! rendered stay blank.
 
 use super::engines::{Contender, EngineKind};
 use crate::engine::EngineError;
@@ -29,8 +29,8 @@ pub struct Setting {
     shadow_rays: Option<u32>,
 }
 
-/// The report's four settings, its Figures 5 to 8. Our scenes of the same description stand in for the report's, which
-/// were not published; the light itself is in every picture, as it is there.
+/// The report's four settings, its Figures 5 to 8. The report's scenes were not published, so we use our own scenes of the
+/// same description. As in the report, every picture includes emitted light.
 pub const SETTINGS: [Setting; 4] = [
     Setting {
         name: "indirect light only",
@@ -94,7 +94,7 @@ pub struct Cell {
     pub resolution: [u32; 2],
     /// Rays per pixel-sample.
     pub rays: u64,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u64,
     /// Seconds in the engine from the first sample on, reading back included; `None` when it was not done in time.
     pub seconds: Option<f64>,
@@ -102,9 +102,9 @@ pub struct Cell {
     pub relative_error: Option<f64>,
 }
 
-/// Renders one picture through all counts of [`RAYS`] and says when it passed each. `time` is for all of them; a count
-/// that by the pace so far would not be reached in time is not begun. What is done is in `cells` whatever happens;
-/// true unless `stop` was set.
+/// Renders one picture through all counts of [`RAYS`] and records the time at each. `time` is for all of them; skips a count
+/// that would not be reached in time at the speed so far. `cells` holds the results so far, even after an error. Returns
+/// false if `stop` was set.
 pub fn measure(
     setting: &Setting,
     contender: &mut Contender,
@@ -122,7 +122,7 @@ pub fn measure(
     contender.reseed(settings.seed);
     for rays in RAYS {
         let samples = rays * settings.round();
-        // The first count is rendered whatever it takes.
+        // The first count is always rendered.
         over |= done > 0 && seconds * samples as f64 / done as f64 > limit;
         if !over {
             let job = Job {
@@ -160,7 +160,7 @@ pub fn measure(
     Ok(true)
 }
 
-/// The engines in `cells` that left something out.
+/// The engines in `cells` that have blank cells.
 pub fn blank(cells: &[Cell]) -> Vec<&'static str> {
     let mut names: Vec<&str> = cells
         .iter()

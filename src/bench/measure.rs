@@ -1,7 +1,7 @@
-//! The measuring: samples in powers of two, every engine in turn.
+//! Measures pictures with sample counts in powers of two, with each engine in turn.
 //!
-//! Each number comes from a picture begun anew, so that no two of them share samples. Engines take turns at each
-//! seed: what else the machine does meanwhile hits all of them alike.
+//! Each picture is rendered from the first sample, so that no two of them share samples. The engines take turns at each
+//! seed, so that other load on the machine affects all of them equally.
 
 use super::engines::{Contender, EngineKind};
 use super::errors::{Errors, Truth};
@@ -13,23 +13,23 @@ use crate::settings::Settings;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// What is to be measured.
+/// The plan of a benchmark.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// A picture of each sample count for each of them.
+    /// The seeds: one picture per sample count and seed.
     pub seeds: Vec<u32>,
-    /// Rendering time of each engine over all its pictures. Its first sample count is measured whatever it takes.
+    /// Rendering time of each engine over all its pictures. Its first sample count is always measured.
     pub time: Duration,
-    /// The most samples a pixel.
+    /// Most samples per pixel.
     pub most_samples: u64,
 }
 
 /// One picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
-    /// Who made it.
+    /// Its engine.
     pub engine: EngineKind,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u64,
     /// Its seed.
     pub seed: u32,
@@ -43,18 +43,18 @@ pub struct Measurement {
     pub errors: Errors,
 }
 
-/// Where the measuring stands, for those who wait.
+/// The progress of a benchmark.
 #[derive(Debug, Clone, Copy)]
 pub struct Standing {
-    /// Of the time that all engines have; 0..=1.
+    /// Fraction of the time of all engines, 0..=1.
     pub fraction: f64,
-    /// Who is rendering.
+    /// The engine that is rendering.
     pub engine: EngineKind,
-    /// The samples a pixel of the picture in work.
+    /// Samples per pixel of the current picture.
     pub samples: u64,
 }
 
-/// Measures; what is done is in `done` whatever happens. True unless `stop` was set.
+/// Runs the plan. `done` holds the results so far, even after an error. Returns false if `stop` was set.
 pub fn measure(
     contenders: &mut [Contender],
     truth: &Truth,
@@ -112,7 +112,7 @@ struct Spent {
     total: f64,
     /// Seconds over those of the last sample count.
     last: f64,
-    /// Whether the next sample count would be too much.
+    /// Whether the next sample count would take too long.
     over: bool,
 }
 
@@ -127,7 +127,7 @@ impl Spent {
     }
 }
 
-/// Renders one picture and holds it against the truth; `None` when it was stopped.
+/// Renders one picture and compares it with the reference; `None` if it was stopped.
 fn picture(
     contender: &mut Contender,
     truth: &Truth,

@@ -1,8 +1,8 @@
-//! Speed against error: how long an engine takes for how small an error.
+//! Benchmarks: error against rendering time.
 //!
-//! Pictures of 1, 2, 4, ... samples a pixel with several seeds are held against a reference. The measure that does not
-//! depend on how long was rendered is the *efficiency* 1 / (MSE × seconds), and it means something as a ratio alone,
-//! within one run on one machine.
+//! Pictures with 1, 2, 4, ... samples per pixel and several seeds are compared with a reference. The *efficiency*
+//! 1 / (MSE × seconds) does not depend on the rendering time. Only ratios of efficiencies are meaningful, within one run on
+//! one machine.
 
 pub mod engines;
 pub mod errors;
@@ -67,7 +67,7 @@ pub struct Results {
     pub mean_path_length: f64,
     /// The engines, in the order that was asked for.
     pub entrants: Vec<Entrant>,
-    /// What pictures were held against.
+    /// The reference.
     pub reference: Reference,
     /// One for each picture, in the order in which they were made.
     pub measurements: Vec<Measurement>,
@@ -91,10 +91,10 @@ const COUNTED_PIXELS: f64 = 2048.0;
 /// Samples of each of them.
 const COUNTED_SAMPLES: u64 = 16;
 
-/// Vertices of a path, the last one included and the eye not, on average over the picture: counted on the CPU
-/// reference without light sampling, where each is the end of one ray (a ray that leaves the scene counts too). How a
-/// path goes on does not depend on shadow rays, so this describes the scene, whatever the engine. From some thirty
-/// thousand paths: good to a few per cent.
+/// Mean number of path vertices over the picture, including the last one but not the eye. Counted on the CPU
+/// reference without light sampling, where each vertex is the end of one ray (a ray that leaves the scene counts too). Shadow
+/// rays do not change how a path continues, so the number describes the scene, for every engine. It is based on about 30 000
+/// paths, and accurate to a few per cent.
 pub fn mean_path_length(
     scene: &Scene,
     settings: &Settings,

@@ -1,4 +1,4 @@
-//! JSON lines: what was measured, for scripts. Each line is an object whose key `type` says which.
+//! The results as JSON lines. Each line is an object whose key `type` names its kind.
 //!
 //! | type | one for each |
 //! |---|---|
@@ -167,7 +167,8 @@ pub fn scaling_lines(scaling: &Scaling) -> String {
 
 /// A record and a line break.
 pub fn line(record: &Record) -> String {
-    // Strings, numbers and fixed keys: nothing that could fail. serde_json writes what is not finite as null.
+    // This can't fail: a record has only strings, numbers and fixed keys. serde_json writes numbers that are not finite as
+    // null.
     serde_json::to_string(record).expect("a record is plain data") + "\n"
 }
 

@@ -1,4 +1,4 @@
-//! The picture that all others are held against: given, kept from an earlier run, or made.
+//! The reference picture of a benchmark: given by the user, cached by an earlier run, or rendered.
 
 use super::engines::Contender;
 use super::errors::Truth;
@@ -15,17 +15,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// The seed of references: no picture that is measured has it, for what both have missed by chance nobody would see.
+/// The seed of references. No measured picture has it: with shared samples, both would have the same noise, and it would not
+/// be measured.
 pub const SEED: u32 = 0x5245_4621;
 
 /// A reference picture.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    /// What pictures are held against.
+    /// The picture.
     pub truth: Truth,
-    /// Where it is from, in words.
+    /// Its origin, as text.
     pub about: String,
-    /// Samples a pixel; `None` when the picture does not say.
+    /// Samples per pixel; `None` when the picture does not say.
     pub samples: Option<u64>,
     /// Its seed, if it says.
     pub seed: Option<u32>,
@@ -33,12 +34,11 @@ pub struct Reference {
     pub path: Option<PathBuf>,
     /// Whether all its samples were there already.
     pub cached: bool,
-    /// What went wrong with the cache, if anything did; the picture is none the worse for it.
+    /// A problem with the cache, which does not affect the picture.
     pub warning: Option<String>,
 }
 
-/// Reads a picture that the user gives. Its size is the scene's, and if it says what scene and settings it was made
-/// from, they are these.
+/// Reads a picture given by the user. It must have the scene's size. If it states its scene and settings, they must match.
 pub fn given(path: &Path, scene_hash: &str, size: [u32; 2]) -> Result<Reference, FileError> {
     let picture = Picture::read(path)?;
     let wrong = |why: String| FileError::content(path, why);
@@ -47,12 +47,12 @@ pub fn given(path: &Path, scene_hash: &str, size: [u32; 2]) -> Result<Reference,
         .is_some_and(|e| e.eq_ignore_ascii_case("png"))
     {
         return Err(wrong(
-            "8 bits are too few for a reference; give an .exr or a film".into(),
+            "a reference needs more than 8 bits per channel; use an .exr or a film".into(),
         ));
     }
     if picture.size != size {
         return Err(wrong(format!(
-            "the reference has {} x {} pixels, the picture {} x {}",
+            "the reference has {} x {} pixels, but the picture has {} x {}",
             picture.size[0], picture.size[1], size[0], size[1]
         )));
     }
@@ -60,7 +60,7 @@ pub fn given(path: &Path, scene_hash: &str, size: [u32; 2]) -> Result<Reference,
         && hash != scene_hash
     {
         return Err(wrong(
-            "the reference is of another scene or other settings, by its hash".into(),
+            "the reference is of another scene or has other settings (its hash differs)".into(),
         ));
     }
     let samples = picture.noise.as_ref().map(|n| n.samples.iter().min());
@@ -75,8 +75,8 @@ pub fn given(path: &Path, scene_hash: &str, size: [u32; 2]) -> Result<Reference,
     })
 }
 
-/// Makes a reference of `samples` a pixel, or goes on with the one that lies in `cache`; `None` when `stop` was set, after
-/// keeping what there is. `contender` is ready for scene and settings, whatever its seed.
+/// Renders a reference with `samples` samples per pixel, or resumes the one in `cache`. `None` if `stop` was set; the samples
+/// so far are then saved in the cache. `contender` is prepared for scene and settings, with any seed.
 pub fn make(
     contender: &mut Contender,
     scene: &Scene,
@@ -98,7 +98,7 @@ pub fn make(
     if let Some(path) = path.as_ref().filter(|p| p.exists()) {
         match kept(path, &provenance) {
             Ok(old) => (film, provenance) = old,
-            Err(why) => warning = Some(format!("{why}; the reference is made anew")),
+            Err(why) => warning = Some(format!("{why}; the reference is rendered again")),
         }
     }
     let before = film.coverage.samples().0;
@@ -126,7 +126,7 @@ pub fn make(
             && tally.counters.paths > 0
             && let Err(e) = keep(path, &film, &provenance)
         {
-            warning = Some(format!("{e}; the reference is not kept"));
+            warning = Some(format!("{e}; the reference is not cached"));
         }
         if ended.map_err(|e| e.to_string())? == StopReason::Interrupted {
             return Ok(None);
@@ -145,7 +145,7 @@ pub fn make(
     }))
 }
 
-/// The name of the film that is kept: by what fixes the expected picture, and by all that fixes its samples.
+/// The name of the cached film. It contains everything that determines the expected picture and the samples.
 fn file_name(provenance: &Provenance, identity: &str) -> String {
     let s = &provenance.settings;
     let made_with = format!(
@@ -171,12 +171,12 @@ fn kept(path: &Path, wanted: &Provenance) -> Result<(Film, Provenance), String> 
 
 fn keep(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), FileError> {
     if let Some(dir) = path.parent() {
-        fs::create_dir_all(dir).map_err(|e| FileError::io(dir, "cannot make the folder", &e))?;
+        fs::create_dir_all(dir).map_err(|e| FileError::io(dir, "cannot create the folder", &e))?;
     }
     store::save(path, film, provenance)
 }
 
-/// Where references are kept unless the user names a folder: `etendue` in the user's cache. `None` where there is no home.
+/// The default folder for references: `etendue` in the user's cache folder. `None` if the user has no home.
 pub fn default_cache() -> Option<PathBuf> {
     let set = |name| {
         std::env::var_os(name)
@@ -193,7 +193,7 @@ mod tests {
     use crate::provenance::tests::example;
 
     #[test]
-    fn what_it_was_made_with_is_part_of_the_name() {
+    fn the_cache_name_contains_everything_that_changes_the_reference() {
         let a = example([4, 3]);
         let name = file_name(&a, "gpu-baked; llvmpipe; Mesa 1; 00");
         assert_eq!(file_name(&a, "gpu-baked; llvmpipe; Mesa 1; 00"), name);

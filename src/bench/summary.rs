@@ -1,4 +1,4 @@
-//! What the measurements say: means over seeds with their spread, efficiency, and how the error falls.
+//! Summarises measurements: means over seeds with their spread, efficiency, and the slope of the error.
 
 use super::engines::EngineKind;
 use super::measure::Measurement;
@@ -47,7 +47,7 @@ impl Spread {
 pub struct Point {
     /// Who.
     pub engine: EngineKind,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u64,
     /// How many seeds were measured.
     pub seeds: usize,
@@ -73,8 +73,8 @@ pub struct Point {
     pub flip: Spread,
     /// √ of the relative MSE; `None` where it is not positive for some seed.
     pub true_relative_error: Option<Spread>,
-    /// What the pictures state of it. Where light comes in rare bright samples that is less: pixels that had one state a
-    /// large error beside a luminance that is too large. The claimed MSE has no such weights.
+    /// The relative error that the pictures state. If the light comes from rare bright samples, it is smaller: a pixel with
+    /// such a sample states a large error, but also too large a luminance. The claimed MSE has no such weights.
     pub claimed_relative_error: Option<Spread>,
     /// 1 / (mean MSE × mean seconds), with the spread of single seeds; `None` where the MSE is not positive.
     pub efficiency: Option<Spread>,
@@ -164,9 +164,8 @@ fn above_0(x: f64) -> Option<f64> {
     (x > 0.0 && x.is_finite()).then_some(x)
 }
 
-/// How an engine's error falls with time: the slope of log √MSE against log seconds, by least squares for each seed.
-/// -1/2 is Monte Carlo; steeper is the sampler's doing, flatter what a picture costs besides its samples. `None` with
-/// fewer than three sample counts.
+/// The slope of log √MSE against log seconds, by least squares for each seed. Plain Monte Carlo has -1/2. A better sampler
+/// makes it steeper; a fixed cost per picture makes it flatter. `None` with fewer than three sample counts.
 pub fn slope(engine: EngineKind, measurements: &[Measurement]) -> Option<Spread> {
     let mine = || measurements.iter().filter(move |m| m.engine == engine);
     let mut seeds: Vec<u32> = mine().map(|m| m.seed).collect();
@@ -301,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_better_than_the_reference_has_no_efficiency() {
+    fn no_efficiency_for_pictures_no_better_than_the_reference() {
         let mut m = one(EngineKind::Cpu, 8, 1, 0.1, -1.0);
         (m.errors.mse, m.errors.relative_mse) = (-1e-9, -1e-9);
         let p = &points(&[EngineKind::Cpu], &[m])[0];

@@ -4,7 +4,7 @@ use super::figure9::{Cell, RAYS};
 use super::summary::{Spread, millions, slope};
 use super::{EngineKind, Point, Results};
 
-/// Columns of text, the first one aligned left, the others right; but what stands under `on` is left too.
+/// Columns of text. The first one and `on` are aligned left, the others right.
 pub(super) struct Columns(Vec<Vec<String>>);
 
 impl Columns {
@@ -61,16 +61,16 @@ fn reference(results: &Results) -> String {
     let r = &results.reference;
     let samples = r
         .samples
-        .map_or(String::new(), |n| format!(", {n} samples a pixel"));
+        .map_or(String::new(), |n| format!(", {n} samples per pixel"));
     let noise = match r.truth.noise_floor() {
         Some(error) => format!(
             ", relative error {}, which is subtracted from squared errors (not from FLIP)",
             percent(error)
         ),
-        None => ", which does not state its noise: it counts as error".into(),
+        None => ", which does not state its noise, so its noise counts as error".into(),
     };
     let kept = match &r.path {
-        Some(path) if r.cached => format!(" (kept in {})", path.display()),
+        Some(path) if r.cached => format!(" (cached in {})", path.display()),
         _ => String::new(),
     };
     format!("reference: {}{samples}{noise}{kept}\n", r.about)
@@ -79,15 +79,15 @@ fn reference(results: &Results) -> String {
 /// A reference whose stated relative error is more than this share of a picture's error is called short.
 const SHORT: f64 = 0.5;
 
-/// A warning where pictures come near the reference: its noise is subtracted, but a relative error also rests on its
-/// luminances, and FLIP has no correction.
+/// A warning if the error of a picture is close to that of the reference. The reference's noise is subtracted, but relative
+/// errors also depend on its luminances, and FLIP has no correction.
 fn reference_note(results: &Results, points: &[Point]) -> String {
     let errors = points.iter().filter_map(|p| p.true_relative_error);
     let least = errors.map(|e| e.mean).fold(f64::INFINITY, f64::min);
     match results.reference.truth.noise_floor() {
         Some(noise) if noise > SHORT * least => format!(
-            "note: the reference's relative error, {}, is near the least one here, {}; more --reference-spp would tell \
-             better\n",
+            "note: the relative error of the reference, {}, is close to the smallest one here, {}; raise --reference-spp for better \
+             results\n",
             percent(noise),
             percent(least)
         ),
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_stand_under_their_names() {
+    fn columns_are_aligned_with_their_names() {
         let mut c = Columns::new(&["engine", "x"]);
         c.push(vec!["cpu".into(), "±10".into()]);
         assert_eq!(c.text(), "engine    x\ncpu     ±10\n");

@@ -3,7 +3,7 @@
 use super::failure::Failure;
 use crate::gpu;
 
-/// Lists the adapters in order of preference, and which one a render would take.
+/// Lists the adapters in order of preference, and says which one a render would use.
 pub fn adapters() -> Result<(), Failure> {
     let mut text = String::new();
     let mut taken = false;
@@ -14,8 +14,8 @@ pub fn adapters() -> Result<(), Failure> {
             "hardware"
         };
         let verdict = match &adapter.usable {
-            Ok(()) if !taken => "taken by default".to_owned(),
-            Ok(()) => "usable, but comes later".to_owned(),
+            Ok(()) if !taken => "used by default".to_owned(),
+            Ok(()) => "usable with --adapter".to_owned(),
             Err(why) => format!("not usable: {why}"),
         };
         taken |= adapter.usable.is_ok();
@@ -25,13 +25,16 @@ pub fn adapters() -> Result<(), Failure> {
         );
     }
     text += if taken {
-        "CPU reference: taken with --backend cpu\n"
+        "CPU reference: used with --backend cpu\n"
     } else {
-        "CPU reference: taken by default, as there is no usable adapter\n"
+        "CPU reference: used by default, as there is no usable adapter\n"
     };
     super::write_stdout(&text)?;
     if !taken {
-        super::say!("for a software adapter: {}", super::backend::GET_ADAPTER);
+        super::say!(
+            "help: to install a software adapter: {}",
+            super::backend::GET_ADAPTER
+        );
     }
     Ok(())
 }

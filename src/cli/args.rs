@@ -14,7 +14,7 @@ use crate::scene::generate::MOST_IN_TABLES;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-/// A path tracer for analytic scenes that says how wrong every picture still is.
+/// A GPU path tracer for analytic scenes that reports the error of every picture
 #[derive(Debug, Parser)]
 #[command(version, subcommand_required = true, arg_required_else_help = true)]
 #[command(after_help = "\
@@ -24,8 +24,9 @@ Examples:
   etendue adapters
   etendue selftest
 
-Exit status: 0 done, passed or the same; 1 failed or different; 2 bad command line or input; 3 no adapter or it failed; \
-4 a file can't be read or written; 130, 143 or 129 interrupted (Ctrl-C, SIGTERM, SIGHUP), after saving what there is.")]
+Exit status: 0 success; 1 pictures differ or a test failed; 2 bad command line or invalid input; 3 no usable adapter, or the \
+device failed; 4 a file can't be read or written; 130, 143 or 129 interrupted (Ctrl-C, SIGTERM, SIGHUP), after saving the \
+results so far.")]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -35,50 +36,50 @@ pub struct Cli {
 /// One of the program's commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render a scene file into pictures
+    /// Render a scene to pictures
     Render(Box<RenderArgs>),
-    /// Read scene files and say what is wrong or suspect in them
+    /// Check scene files for errors and likely mistakes
     Check(CheckArgs),
-    /// Make pictures from a film
+    /// Convert a film to pictures
     Develop(DevelopArgs),
-    /// Add films of the same scene
+    /// Merge films of the same scene into one
     Merge(MergeArgs),
-    /// Run the hard cases, whose answers are known, on this adapter
+    /// Test this adapter on hard cases with known answers
     Selftest(SelftestArgs),
-    /// Say whether two pictures are the same up to their noise
+    /// Test whether two pictures are equal up to noise
     Compare(CompareArgs),
-    /// Render every scene of a folder and compare it with its golden picture
+    /// Render every scene in a folder and compare it with its golden picture
     Regress(RegressArgs),
-    /// Write a scene of many spheres or many lights
+    /// Generate a scene with many spheres or many lights
     MakeScene(MakeSceneArgs),
-    /// Measure speed against error
+    /// Measure error against rendering time
     Bench(Box<BenchArgs>),
-    /// List the adapters, which one would be taken, and why not the others
+    /// List the adapters, the default one, and why the others are not used
     #[command(after_help = "\
 Examples:
   etendue adapters
   etendue render scene.toml --adapter llvmpipe
-      on the adapter whose name contains that")]
+      render on the adapter whose name contains llvmpipe")]
     Adapters,
     /// Print the JSON Schema of scene files
     #[command(after_help = "\
 Example:
   etendue schema > scene.schema.json
-      for a TOML editor: completion, and most errors while typing")]
+      gives a TOML editor completion and error checking")]
     Schema,
 }
 
-/// How much a long command says.
+/// How much a long command prints.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Talk {
-    /// Say nothing but warnings and errors
+    /// Print only warnings and errors
     #[arg(long)]
     pub quiet: bool,
-    /// How to show progress: a bar on a terminal and a line every few seconds elsewhere (auto), always lines
-    /// (plain), or nothing (none)
+    /// How to show progress: auto is a bar on a terminal and a line every few seconds elsewhere, plain is always
+    /// lines, none is nothing
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto, value_name = "STYLE")]
     pub progress: ProgressStyle,
-    /// Threads of the CPU reference and of a software adapter [default: one for each core]
+    /// Threads for the CPU reference or a software adapter [default: one per core]
     #[arg(long, value_name = "N", value_parser = values::whole::<u16>(1, 4096), allow_hyphen_values = true)]
     pub threads: Option<u16>,
 }
@@ -88,20 +89,20 @@ pub struct Talk {
 #[command(after_help = "\
 Examples:
   etendue make-scene spheres --count 1000
-      spheres.toml, with the spheres in spheres.csv
+      writes spheres.toml, and the spheres themselves to spheres.csv
   etendue make-scene lights --count 100 -o hall.toml")]
 pub struct MakeSceneArgs {
-    /// What there are many of
+    /// Which objects the scene has many of
     #[arg(value_enum)]
     pub kind: SceneKind,
-    /// How many
+    /// How many of them
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 5_000_000), allow_hyphen_values = true)]
     pub count: u32,
-    /// Another one of the same kind
+    /// Seed of the generator: each gives a different scene of the same kind
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = values::seed(), allow_hyphen_values = true)]
     pub seed: u32,
-    #[arg(help = format!("The scene file [default: spheres.toml or lights.toml]. More than {MOST_IN_TABLES} things go into a \
-                          file of rows beside it, which has the ending .csv"))]
+    #[arg(help = format!("Scene file to write [default: spheres.toml or lights.toml]. More than {MOST_IN_TABLES} objects go to a \
+                          .csv file beside it"))]
     /// `--output`.
     #[arg(short, long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
@@ -110,7 +111,7 @@ pub struct MakeSceneArgs {
 /// What `etendue make-scene` makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SceneKind {
-    /// Spheres on a floor, in the order of a sunflower's seeds.
+    /// Spheres on a floor, placed like the seeds of a sunflower.
     Spheres,
     /// Lamps in a hall of columns.
     Lights,
@@ -130,9 +131,9 @@ pub enum ProgressStyle {
 /// `--backend`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Backend {
-    /// A real GPU, else a software adapter, else the CPU reference.
+    /// A hardware GPU if there is one, else a software adapter, else the CPU reference.
     Auto,
-    /// Any adapter.
+    /// Any adapter, hardware or software.
     Gpu,
     /// The f64 reference.
     Cpu,
@@ -155,22 +156,22 @@ Examples:
   etendue selftest --filter dome
   etendue selftest --backend cpu --markdown > hard-cases.md
 
-Exit status 1: a case failed.")]
+Exit status: 0 if every case passed, 1 if one failed.")]
 pub struct SelftestArgs {
-    /// Only the cases whose row, name or description contains TEXT, in any case
+    /// Run only cases whose row, name or description contains TEXT (ignoring case)
     #[arg(long, value_name = "TEXT")]
     pub filter: Option<String>,
     /// Print a Markdown table
     #[arg(long)]
     pub markdown: bool,
-    /// What is tested: any adapter (gpu), the f64 reference (cpu), or what a render would take (auto)
+    /// What to test: gpu is any adapter, cpu the f64 reference, auto what `etendue render` would choose
     #[arg(long, value_enum, default_value_t = Backend::Auto, value_name = "NAME")]
     pub backend: Backend,
-    /// The adapter whose name contains NAME, in any case
+    /// Use the adapter whose name contains NAME (ignoring case)
     #[arg(long, value_name = "NAME", value_parser = values::part_of_name)]
     pub adapter: Option<String>,
 
-    /// How much to say.
+    /// How much to print.
     #[command(flatten)]
     pub talk: Talk,
 }

@@ -9,26 +9,26 @@ use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
 use crate::world::World;
 
-/// How to come by an adapter, for those who have none.
+/// The command that installs a software adapter (Debian, Ubuntu).
 pub const GET_ADAPTER: &str = "apt-get install mesa-vulkan-drivers";
 
-/// An engine, and what the renderer must know about it.
+/// An engine that is ready to render, and what the renderer must know about it.
 pub struct Chosen {
     /// What renders.
     pub engine: Box<dyn Engine>,
-    /// Seconds that making the kernel took.
+    /// Seconds spent on generating and compiling the kernel.
     pub compile_seconds: f64,
-    /// The kernel made for the scene, if there is one.
+    /// The kernel generated for the scene; the CPU reference has none.
     pub wgsl: Option<String>,
     /// How that kernel reaches the scene's values.
     pub access: Option<Access>,
-    /// The most pixels to give it at once.
+    /// Most pixels in one call to the engine.
     pub tile_pixels: u64,
-    /// Why it is not a faster one, when that was not the user's choice.
+    /// Why the CPU reference renders although the user did not ask for it.
     pub note: Option<String>,
 }
 
-/// The engine that `backend` and `adapter` ask for, ready for this scene; `tell` hears what is being made of it.
+/// The engine that `backend` and `adapter` select, ready for this scene. Calls `tell` at each step of the preparation.
 pub fn choose(
     backend: Backend,
     adapter: Option<&str>,
@@ -60,8 +60,8 @@ pub fn choose(
     }
 }
 
-/// The open adapter that `backend` and `adapter` ask for, whatever the scene; `None` for the CPU reference, and why it is
-/// that, when it was not the user's choice.
+/// Opens the adapter that `backend` and `adapter` select. `None` means the CPU reference; the second value then says why,
+/// unless the user asked for it.
 pub fn open(
     backend: Backend,
     adapter: Option<&str>,
@@ -78,27 +78,29 @@ pub fn open(
     }
 }
 
-/// Refuses an adapter's name beside the reference.
+/// Refuses `--adapter` together with `--backend cpu`.
 pub fn check_flags(backend: Backend, adapter: Option<&str>) -> Result<(), Failure> {
     if backend == Backend::Cpu && adapter.is_some() {
-        let message = "--adapter names a GPU adapter, which --backend cpu does not use";
+        let message = "--adapter can't be used with --backend cpu, which uses no adapter";
         return Err(Failure::Input(message.into()));
     }
     Ok(())
 }
 
-/// Why it is the CPU reference instead of a GPU, where that will do; else the failure.
+/// The note that the CPU reference renders instead, if the flags allow that; else the failure.
 fn instead(e: &GpuError, backend: Backend, adapter: Option<&str>) -> Result<String, Failure> {
     match e {
         _ if backend == Backend::Auto && adapter.is_none() => {
             let faster = match e {
-                GpuError::NoAdapter(_) => format!("; for a faster one: {GET_ADAPTER}"),
+                GpuError::NoAdapter(_) => {
+                    format!(" (to install a faster software adapter: {GET_ADAPTER})")
+                }
                 GpuError::Unable { .. } => String::new(),
             };
             Ok(format!("{e}; rendering on the CPU reference{faster}"))
         }
         GpuError::NoAdapter(_) if adapter.is_none() => Err(Failure::Device(format!(
-            "{e}; for a software one: {GET_ADAPTER}"
+            "{e}; to install a software adapter: {GET_ADAPTER}"
         ))),
         _ => Err(Failure::Device(e.to_string())),
     }

@@ -5,7 +5,7 @@ use super::failure::Failure;
 use crate::scene::{Scene, check as lints, parse};
 use std::path::Path;
 
-/// Reads and lints every file; the status of the first that fails is the command's.
+/// Reads and lints every file. The exit status is that of the first file that fails.
 pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     let mut first_failure = None;
     for path in &args.scenes {
@@ -21,7 +21,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     first_failure.map_or(Ok(()), Err)
 }
 
-/// Says what is suspect on stderr, and that the file is legal on stdout.
+/// Prints warnings on stderr, and a summary of the valid file on stdout.
 fn report(path: &Path, scene: &Scene) -> Result<(), Failure> {
     let warnings = lints::lint(scene);
     for w in &warnings {

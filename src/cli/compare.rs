@@ -10,10 +10,10 @@ use crate::output::atomic;
 use std::io::Write;
 use std::path::Path;
 
-/// Two pictures to read, and to compare them.
+/// Read one picture, read the other, compare them.
 const STEPS: usize = 3;
 
-/// Prints what it finds; exit status 1 when the pictures differ.
+/// Prints the comparison. The exit status is 1 if the pictures differ.
 pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let mut files = Files::default();
     files.reads("a picture to compare", &args.a)?;
@@ -28,7 +28,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
         Picture::read(path)
     };
     let (a, b) = (read(0, &args.a)?, read(1, &args.b)?);
-    progress.step(2, STEPS, "the comparison");
+    progress.step(2, STEPS, "comparing");
     let limits = Limits {
         alpha: args.alpha,
         max_flip: args.max_flip,

@@ -7,7 +7,7 @@ use super::progress::Progress;
 use crate::film::store;
 use crate::output::Format;
 
-/// Writes each picture as `render` would have.
+/// Writes the pictures that `render` would have written.
 pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     let formats: Vec<Format> = args
         .output

@@ -1,20 +1,20 @@
-//! What Vulkan drivers read from the environment.
+//! Sets environment variables that Vulkan drivers read.
 
 use super::args::Command;
 use crate::bench::reference::default_cache;
 use std::ffi::OsString;
 
-/// Camera paths up to which a kernel that is compiled in half the time and takes twice as long is the faster one: lavapipe
-/// compiles for a tenth to a quarter of a second longer to be rid of the difference.
+/// Up to this many camera paths, an unoptimised kernel is faster overall on lavapipe: it compiles in half the time (0.1 to
+/// 0.25 s less) and runs half as fast.
 const FEW_PATHS: u64 = 400_000;
 
-/// Sets it for `command`; a value that the user has set stays. For a process that has one thread yet.
+/// Sets the variables for `command`. A value that the user has set stays. Call it while the process has a single thread.
 pub(super) fn prepare(command: &Command) {
-    // Mesa's layer for choosing among screens complains on stderr where there is no screen.
+    // Mesa's device-select layer complains on stderr if there is no display.
     set("NODEVICE_SELECT", || Some("1".into()));
     wide_vectors();
     if few_paths(command) {
-        // Without LLVM's optimisations; what is left gives the same bits.
+        // Turns off LLVM's optimisations. The results have the same bits.
         set("GALLIVM_PERF", || Some("nopt".into()));
     }
     let talk = match command {
@@ -22,14 +22,14 @@ pub(super) fn prepare(command: &Command) {
         Command::Selftest(args) => Some(args.talk),
         Command::Regress(args) => Some(args.talk),
         Command::Bench(args) => {
-            // What a kernel costs is told for one that is compiled afresh.
+            // A benchmark measures compiling, so no kernel may come from the cache.
             set("MESA_SHADER_CACHE_DISABLE", || Some("true".into()));
             Some(args.talk)
         }
         _ => None,
     };
     if let Some(threads) = talk.and_then(|t| t.threads) {
-        // lavapipe's own.
+        // Read by lavapipe.
         set("LP_NUM_THREADS", || Some(threads.to_string().into()));
     }
 }
@@ -42,14 +42,14 @@ fn set(name: &str, value: impl FnOnce() -> Option<OsString>) {
     if !is_set(name)
         && let Some(value) = value()
     {
-        // SAFETY: the process has one thread yet, so nobody reads the environment meanwhile.
+        // SAFETY: the process still has a single thread, so nothing else reads the environment.
         unsafe { std::env::set_var(name, value) };
     }
 }
 
-/// llvmpipe takes 256-bit vectors of its own accord; with these a sample has the same bits and costs a quarter less. Mesa's
-/// disk cache does not tell kernels of one width from those of another, and would give wrong pictures: these have a
-/// cache of their own, or none.
+/// Uses 512-bit vectors on llvmpipe, whose default is 256: samples have the same bits and take a quarter less time. Mesa's
+/// disk cache does not distinguish kernels by vector width, so a shared cache gives wrong pictures. Kernels of this width get
+/// their own cache, or none.
 fn wide_vectors() {
     const WIDTH: &str = "LP_NATIVE_VECTOR_WIDTH";
     #[cfg(target_arch = "x86_64")]
@@ -62,14 +62,14 @@ fn wide_vectors() {
         set(WIDTH, || Some("512".into()));
         let folder = default_cache().map(|cache| cache.join("mesa-512"));
         match folder.filter(|folder| std::fs::create_dir_all(folder).is_ok()) {
-            // SAFETY: as above. Wherever the user's cache is, it may hold kernels of another width.
+            // SAFETY: as in `set`. Overrides the user's value too, whose cache may hold kernels of another width.
             Some(folder) => unsafe { std::env::set_var("MESA_SHADER_CACHE_DIR", folder) },
             None => set("MESA_SHADER_CACHE_DISABLE", || Some("true".into())),
         }
     }
 }
 
-/// Whether the command line alone says that there is little to render.
+/// Whether the command line alone shows that there are few paths to render.
 fn few_paths(command: &Command) -> bool {
     match command {
         Command::Render(args) => match (args.size, args.spp) {

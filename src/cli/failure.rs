@@ -1,33 +1,33 @@
-//! Why a command ends without success, and the exit status that says so.
+//! Failures of a command, and their exit statuses.
 
 use crate::engine::EngineError;
 use crate::output::FileError;
 use crate::scene::Diagnostic;
 use crate::scene::parse::ReadError;
 
-/// Why a command ended without success. [`Failure::status`] is the one map to exit statuses, and
-/// [`Failure::print`] the one place that shows them.
+/// Why a command ended without success. Only [`Failure::status`] maps it to an exit status, and only
+/// [`Failure::print`] prints it.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// A bad command line, or inputs that don't fit together.
     #[error("{0}")]
     Input(String),
-    /// A scene file's content is wrong, or files that it names can't be read; one message for each place.
-    #[error("{} errors in the scene", .0.len())]
+    /// A scene file is invalid, or files that it names can't be read; one message for each place.
+    #[error("the scene has {} errors", .0.len())]
     Scene(Vec<Diagnostic>),
     /// No usable adapter, or the device failed.
     #[error("{0}")]
     Device(String),
-    /// A file can't be had, or its content is wrong.
+    /// A file can't be read or written, or its content is invalid.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A signal came, and what there was has been saved.
+    /// A signal came, and the results so far have been saved.
     #[error("interrupted")]
     Interrupted {
         /// SIGHUP is 1, SIGINT 2, SIGTERM 15.
         signal: u8,
     },
-    /// Everything has been said already; only the exit status is left.
+    /// The messages have been printed already; only the exit status is left.
     #[error("failed")]
     Said(u8),
 }
@@ -46,7 +46,7 @@ impl Failure {
         }
     }
 
-    /// Shows it on stderr: `error: `, the message, and the chain of causes.
+    /// Prints it on stderr: `error: `, the message, and the chain of causes.
     pub fn print(&self) {
         match self {
             Failure::Scene(diagnostics) => {
@@ -54,7 +54,7 @@ impl Failure {
                     super::say!("error: {d}");
                 }
             }
-            // The run's closing lines have said so.
+            // The command's last lines have reported these.
             Failure::Interrupted { .. } | Failure::Said(_) => {}
             _ => {
                 let mut text = format!("error: {self}");

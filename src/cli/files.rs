@@ -1,4 +1,4 @@
-//! The files that a command reads and writes: no output may take the place of an input or of another output.
+//! The files that a command reads and writes. No output may overwrite an input or another output.
 
 use super::failure::Failure;
 use crate::output::{FileError, atomic};
@@ -6,47 +6,47 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Links followed to find where an output leads; the system follows no more either.
+/// Most symbolic links that are followed to find where an output leads. Linux has the same limit.
 const MAX_LINKS: usize = 40;
 
-/// Endings of what is no film, by which other files of ours are known.
+/// Extensions of files that are not films.
 const NOT_FILMS: [&str; 7] = ["exr", "png", "toml", "csv", "json", "html", "svg"];
 
-/// What a command reads and writes. Every file is checked against those before it, so that a clash is refused before any
-/// work, whatever the order in which they become known.
+/// The files that a command reads and writes. Each new file is checked against the ones added before, in any order, so that
+/// a clash is found before any work is done.
 #[derive(Default)]
 pub struct Files {
     known: Vec<Known>,
 }
 
 struct Known {
-    /// What it is, for messages: `the scene`, `--report`.
+    /// The file's role, for messages: `the scene`, `--report`.
     what: String,
-    /// As it was given.
+    /// The path as given.
     path: PathBuf,
-    /// Where that leads.
+    /// The path with links resolved.
     real: PathBuf,
     written: bool,
 }
 
 impl Files {
-    /// A file that is read: no output may be the same, before or after.
+    /// Adds an input. No output may be the same file.
     pub fn reads(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
         self.add(what, path, false)
     }
 
-    /// A file that is to be replaced or made in the end. Refused too if that could not be done now.
+    /// Adds an output. Also refused if it could not be written now.
     pub fn writes(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
         if is_stdout(path) {
             return Err(Failure::Input(format!(
-                "{what} -: this goes to a file, not to standard output (as --report, --dump-wgsl, --junit and --json can)"
+                "{what} can't be written to stdout (only --report, --dump-wgsl, --junit and --json can); name a file"
             )));
         }
         self.add(what, path, true)?;
         Ok(atomic::check_writable(path)?)
     }
 
-    /// The same for text, which goes to standard output if its name is `-`.
+    /// Adds a text output, which goes to stdout if its name is `-`.
     pub fn writes_text(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
         if is_stdout(path) {
             return self.add(what, path, true);
@@ -54,16 +54,16 @@ impl Files {
         self.writes(what, path)
     }
 
-    /// A film that is gone on with, or made if there is none.
+    /// Adds a film that is resumed, or created if it does not exist.
     pub fn writes_film(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
         self.writes(what, path)?;
         match fs::metadata(path) {
-            // It would be replaced by another file of this name, which its own permissions could not prevent.
+            // Saving renames a new file over the film. The film's own permissions would not prevent that.
             Ok(meta) if meta.is_file() => {
                 let protected = meta.permissions().readonly();
                 let refused = fs::OpenOptions::new().write(true).open(path);
                 if protected || refused.is_err() {
-                    let message = "cannot write: the film is write-protected".into();
+                    let message = "cannot write the film: it is read-only".into();
                     let path = path.into();
                     return Err(FileError::Io { path, message }.into());
                 }
@@ -75,7 +75,7 @@ impl Files {
     }
 
     fn add(&mut self, what: &str, path: &Path, written: bool) -> Result<(), Failure> {
-        // Devices and pipes hold nothing that could be lost.
+        // Devices and pipes hold no data that could be overwritten.
         if fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
             return Ok(());
         }
@@ -99,12 +99,12 @@ impl Files {
     }
 }
 
-/// Why two files of one place cannot be, one of which at least is written.
+/// The error message for two uses of one file, at least one of which writes it.
 fn clash(a: &Known, b: &Known) -> String {
     let named = |k: &Known| format!("{} {}", k.what, k.path.display());
     match (a.written, b.written) {
         (true, true) => format!(
-            "{} and {}: one would replace the other; name two files",
+            "{} and {} are the same file; name two different files",
             named(a),
             named(b)
         ),
@@ -115,7 +115,7 @@ fn clash(a: &Known, b: &Known) -> String {
 
 fn lost(output: &Known, input: &Known) -> String {
     format!(
-        "{} {}: that is {}{}, which would be lost; name another file",
+        "{} {} would overwrite {}{}; name another file",
         output.what,
         output.path.display(),
         input.what,
@@ -127,19 +127,19 @@ fn lost(output: &Known, input: &Known) -> String {
     )
 }
 
-/// Refuses a new film by a name that says it is something else.
+/// Refuses a new film whose extension belongs to another kind of file.
 fn check_film_name(what: &str, path: &Path) -> Result<(), Failure> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     match extension {
         Some(e) if NOT_FILMS.contains(&e.as_str()) => Err(Failure::Input(format!(
-            "{what} {}: a film is a NumPy archive, and its name ends in .npz, not in .{e}",
+            "{what} {}: a film is a NumPy archive, so its name ends in .npz, not .{e}",
             path.display()
         ))),
         _ => Ok(()),
     }
 }
 
-/// The one name of a file, there or not: links followed, and its folder's too.
+/// The path with all links resolved, also for a file that does not exist yet.
 fn real(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -150,7 +150,7 @@ fn real(path: &Path) -> PathBuf {
             Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
             _ => ".".into(),
         };
-        // A link that leads to nothing yet.
+        // A link to a file that does not exist yet.
         if let Ok(to) = fs::read_link(&path) {
             path = folder.join(to);
             continue;
@@ -161,12 +161,12 @@ fn real(path: &Path) -> PathBuf {
     path
 }
 
-/// Whether this name stands for standard output.
+/// Whether this name means stdout.
 pub fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Writes data to a file, or to standard output if its name is `-`.
+/// Writes text to a file, or to stdout if its name is `-`.
 pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     if is_stdout(path) {
         return super::write_stdout(text);
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn outputs_take_no_other_file_s_place() {
+    fn outputs_overwrite_no_other_file() {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir(dir.path().join("sub")).unwrap();
         let file = |name: &str| dir.path().join(name);
@@ -193,15 +193,18 @@ mod tests {
         files.reads("the scene again", &file("s.toml")).unwrap();
         files.writes("-o", &file("a.png")).unwrap();
         let text = message(files.writes_text("--report", &file("sub/../s.toml")));
-        assert!(text.starts_with("--report ") && text.contains("s.toml: that is the scene "));
+        assert!(
+            text.starts_with("--report ") && text.contains("s.toml would overwrite the scene ")
+        );
         let text = message(files.writes("--watch", &file("./a.png")));
         assert!(
-            text.ends_with("one would replace the other; name two files"),
+            text.ends_with("a.png are the same file; name two different files"),
             "{text}"
         );
-        // Whichever becomes known first.
+        // In the other order too.
         let text = message(files.reads("the rows", &file("a.png")));
-        assert!(text.contains("-o ") && text.ends_with("which would be lost; name another file"));
+        assert!(text.starts_with("-o ") && text.contains("a.png would overwrite the rows"));
+        assert!(text.ends_with("; name another file"));
         assert_eq!(
             fs::read_dir(dir.path()).unwrap().count(),
             2,
@@ -236,13 +239,19 @@ mod tests {
         let dash = Path::new("-");
         files.writes_text("--report", dash).unwrap();
         let text = message(files.writes_text("--dump-wgsl", dash));
-        assert!(text.starts_with("--report - and --dump-wgsl -: "), "{text}");
+        assert!(
+            text.starts_with("--report - and --dump-wgsl - are the same file"),
+            "{text}"
+        );
         let text = message(files.writes("--html", dash));
-        assert!(text.starts_with("--html -: this goes to a file"), "{text}");
+        assert!(
+            text.starts_with("--html can't be written to stdout"),
+            "{text}"
+        );
     }
 
     #[test]
-    fn films_are_not_named_as_something_else_and_protected_ones_stay() {
+    fn films_have_no_other_extension_and_read_only_ones_stay() {
         let dir = tempfile::tempdir().unwrap();
         let file = |name: &str| dir.path().join(name);
         for name in ["f", "f.npz", "f.NPZ", "f.film"] {

@@ -7,7 +7,7 @@ use crate::output::atomic;
 use crate::scene::generate;
 use std::io::Write as _;
 
-/// Writes a scene of many things, and the file of rows beside it that it needs.
+/// Writes a scene with many objects, and the CSV file beside it if it needs one.
 pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
     let (default, make) = match args.kind {
         SceneKind::Spheres => (
@@ -17,14 +17,14 @@ pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
         SceneKind::Lights => ("lights.toml", generate::lights as fn(usize, u32, &str) -> _),
     };
     let scene = args.output.clone().unwrap_or(default.into());
-    // Rows beside it have the ending .csv: of another file than the scene.
+    // The CSV file has the same stem: with the ending .csv the scene itself would be overwritten.
     if !scene
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
     {
         let scene = scene.display();
         return Err(Failure::Input(format!(
-            "--output {scene}: a scene's name ends in .toml"
+            "--output {scene}: the name of a scene must end in .toml"
         )));
     }
     let rows = scene.with_extension("csv");

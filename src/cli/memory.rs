@@ -1,18 +1,17 @@
-//! Whether a picture fits into memory, asked before anything is allocated.
+//! Checks that a picture fits into memory before anything is allocated.
 
 use super::failure::Failure;
 use crate::engine::MAX_TILE_PIXELS;
 use std::fs;
 
-/// Bytes that a pixel of the film takes: four replicates of four f64 sums, and of four f32 sums of the block
-/// in progress.
+/// Bytes per pixel of the film: four replicates, each of four f64 sums and four f32 sums of the unfinished block.
 const FILM_BYTES: u64 = 128 + 64;
 
-/// Bytes that a pixel takes while pictures are written: nine f32 channels and a count.
+/// Bytes per pixel while pictures are written: nine f32 channels and a count.
 const OUTPUT_BYTES: u64 = 40;
 
-/// Bytes that a pixel of the tile in work takes on top, on a software adapter too: two textures, the buffer that is
-/// read back, counters, and their copies.
+/// Additional bytes per pixel of the current tile, whose textures a software adapter keeps in the same memory: two textures,
+/// the buffer that is read back, counters, and their copies.
 const TILE_BYTES: u64 = 384;
 
 fn needed(pixels: u64) -> u64 {
@@ -20,12 +19,12 @@ fn needed(pixels: u64) -> u64 {
     film.saturating_add(pixels.min(MAX_TILE_PIXELS) * TILE_BYTES)
 }
 
-/// Refuses a picture part of `pixels` pixels that memory cannot hold, with the numbers.
+/// Refuses a film of `pixels` pixels that does not fit into memory.
 pub fn check(pixels: u64) -> Result<(), Failure> {
     match available() {
         Some(have) if needed(pixels) > have => Err(Failure::Input(format!(
-            "a film of {:.1} million pixels takes {:.1} GB and {:.1} GB are free: render a smaller --size, or \
-                 a --region at a time",
+            "a film of {:.1} million pixels needs {:.1} GB of memory, but only {:.1} GB are free; use a smaller --size, \
+                 or render one --region at a time",
             pixels as f64 / 1e6,
             needed(pixels) as f64 / 1e9,
             have as f64 / 1e9,
@@ -34,18 +33,18 @@ pub fn check(pixels: u64) -> Result<(), Failure> {
     }
 }
 
-/// Bytes that this process may still take, as far as the system tells (Linux).
+/// Bytes that this process can still allocate. Known on Linux only.
 fn available() -> Option<u64> {
     let system = mem_available(&fs::read_to_string("/proc/meminfo").ok()?)?;
     let number = |path| fs::read_to_string(path).ok()?.trim().parse::<u64>().ok();
-    // In a container the limit of its control group can lie below what the machine has.
+    // In a container the control group's limit can be below the machine's memory.
     let group = number("/sys/fs/cgroup/memory.max")
         .zip(number("/sys/fs/cgroup/memory.current"))
         .map_or(u64::MAX, |(most, now)| most.saturating_sub(now));
     Some(system.min(group).min(address_space()))
 }
 
-/// What `ulimit -v` leaves this process.
+/// Bytes that `ulimit -v` still allows this process.
 fn address_space() -> u64 {
     let left = || {
         let limits = fs::read_to_string("/proc/self/limits").ok()?;
@@ -76,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_largest_picture_is_refused_with_numbers_and_a_small_one_is_not() {
+    fn pictures_too_large_for_memory_are_refused() {
         check(512 * 384).unwrap();
         if available().is_some() {
             let message = check(1 << 40).unwrap_err().to_string();

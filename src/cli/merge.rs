@@ -1,4 +1,4 @@
-//! `etendue merge`: adds films of the same scene.
+//! `etendue merge`: adds up films of the same scene.
 
 use super::args::MergeArgs;
 use super::failure::Failure;
@@ -10,14 +10,14 @@ use crate::film::store::{self, Outline};
 use crate::output::FileError;
 use std::path::{Path, PathBuf};
 
-/// Holes that are listed; more would hide the rest.
+/// Most holes that are listed: more would hide the other messages.
 const LISTED_HOLES: usize = 8;
 
-/// Loads one film after the other, so that memory never holds more than the sum and one of them. They are added in the
-/// order of their samples, whatever that of the command line: the sum has the same bits.
+/// Loads one film at a time, so that memory holds only the sum and one film. Adds them in the order of their samples, so that
+/// the sum has the same bits for every order on the command line.
 pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     if args.out.exists() {
-        let message = "it exists already, and films are never replaced; remove it or name another";
+        let message = "this file exists already, and merge never overwrites a film; remove it or name another";
         return Err(FileError::Io {
             path: args.out.clone(),
             message: message.into(),
@@ -39,7 +39,7 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     for (done, (path, _)) in films.iter().enumerate().skip(1) {
         progress.step(done, steps, &path.display().to_string());
         let (other, its) = store::load(path)?;
-        // Checked before, but a file may have been replaced since.
+        // `fitting` has checked this, but the file may have been replaced since.
         provenance
             .same_samples(&its)
             .map_err(|e| refused(first, path, &e))?;
@@ -58,7 +58,7 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     }
     if holes.len() > LISTED_HOLES {
         let more = holes.len() - LISTED_HOLES;
-        progress.say(&format!("warning: {more} more such holes"));
+        progress.say(&format!("warning: {more} more such gaps"));
     }
     store::save(&args.out, &film, &provenance)?;
     progress.finish();
@@ -70,8 +70,7 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The films and what they say of themselves, in the order of their samples. Refuses films that don't fit together, by
-/// name, before any is loaded.
+/// The films with their outlines, in the order of their samples. Refuses films that don't fit together before any is loaded.
 fn fitting(paths: &[PathBuf]) -> Result<Vec<(&Path, Outline)>, Failure> {
     let mut films: Vec<(&Path, Outline)> = Vec::new();
     for path in paths {
@@ -94,13 +93,13 @@ fn fitting(paths: &[PathBuf]) -> Result<Vec<(&Path, Outline)>, Failure> {
     Ok(films)
 }
 
-/// Names both films: the fault is in the pair, unless one of them is damaged, which may be why.
+/// The error that two films don't fit together, or that one of them is damaged, which may be the cause.
 fn refused(first: &Path, path: &Path, why: &str) -> Failure {
     for film in [first, path] {
         if let Err(damage) = store::load(film) {
             return damage.into();
         }
     }
-    let message = format!("cannot be added to {}: {why}", first.display());
+    let message = format!("cannot be merged with {}: {why}", first.display());
     FileError::content(path, message).into()
 }

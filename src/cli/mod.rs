@@ -32,7 +32,7 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Writes a line to stderr. Unlike `eprintln!` it does not panic when nobody listens.
+/// Writes a line to stderr. Unlike `eprintln!`, it does not panic if stderr is closed.
 macro_rules! say {
     ($($text:tt)*) => {{
         use std::io::Write as _;
@@ -41,13 +41,12 @@ macro_rules! say {
 }
 pub(crate) use say;
 
-/// Runs the program: parses the command line, does what it says, and turns a failure into its
-/// message and exit status.
+/// Parses the command line, runs the command, and turns a failure into its message and exit status.
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
-            // Help and version go to stdout and are no error; a reader that has gone is none either.
+            // Help and version go to stdout and are not errors. Neither is a closed stdout.
             let _ = e.print();
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
         }
@@ -76,7 +75,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Writes data to stdout. A reader that has seen enough (`| head`) is no failure.
+/// Writes data to stdout. A closed pipe (`| head`) is not a failure.
 fn write_stdout(data: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(data.as_bytes()).and_then(|()| out.flush()) {
@@ -87,9 +86,9 @@ fn write_stdout(data: &str) -> Result<(), Failure> {
     }
 }
 
-/// Gives rayon `--threads` threads; one for each core without.
+/// Gives rayon `--threads` threads, or one per core without the flag.
 fn set_threads(threads: Option<u16>) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0).into());
-    // Fails only when the pool stands already, and a process runs one command.
+    // Fails only if the pool exists already. A process runs a single command, so it does not.
     let _ = pool.build_global();
 }

@@ -1,4 +1,4 @@
-//! What a render is to do: which pixels, which samples, and what ends it.
+//! Plans a render: which pixels, which samples, and when to stop.
 
 use super::args::RenderArgs;
 use super::failure::Failure;
@@ -12,11 +12,10 @@ use crate::settings::Settings;
 use std::ops::Range;
 use std::path::Path;
 
-/// Samples a pixel when no stop condition is given.
+/// Samples per pixel when no stop condition is given.
 const DEFAULT_SPP: u64 = 256;
 
-/// The pixels to render: the regions asked for, or the whole picture. A region that reaches out of
-/// the picture is refused.
+/// The pixels to render: the given regions, or the whole picture. Refuses a region that exceeds the picture.
 pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Failure> {
     let [width, height] = settings.size;
     if args.region.is_empty() {
@@ -25,7 +24,7 @@ pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Fail
     for r in &args.region {
         if r.x1 > width || r.y1 > height {
             return Err(Failure::Input(format!(
-                "--region {}: it reaches out of the picture of {width}x{height} pixels",
+                "--region {} exceeds the picture of {width}x{height} pixels",
                 r
             )));
         }
@@ -33,26 +32,26 @@ pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Fail
     Ok(args.region.clone())
 }
 
-/// The smallest rectangle around all regions, of which there is at least one.
+/// The smallest rectangle around all regions. `regions` must not be empty.
 pub fn bounds(regions: &[Rect]) -> Rect {
     regions[1..].iter().fold(regions[0], |a, b| a.union(b))
 }
 
-/// Refuses regions that a film of another part of the picture has no room for.
+/// Refuses regions outside the part of the picture that the film holds.
 pub fn check_bounds(path: &Path, film: &Film, bounds: Rect) -> Result<(), Failure> {
     if film.bounds.union(&bounds) == film.bounds {
         return Ok(());
     }
     Err(Failure::Input(format!(
-        "{}: this film holds the part {} of the picture, and the part asked for is {}; render the rest into a film \
-         of its own, and merge",
+        "{}: this film holds the region {} of the picture, but the command line selects {}; render the rest into \
+         another film and merge the two",
         path.display(),
         film.bounds,
         bounds
     )))
 }
 
-/// Refuses to go on adaptively with a film that was not made so, or of other regions, and evenly with one that was.
+/// Refuses to resume an adaptive film without `--adaptive` or with other regions, and any other film with `--adaptive`.
 pub fn check_adaptive(
     args: &RenderArgs,
     path: &Path,
@@ -60,17 +59,17 @@ pub fn check_adaptive(
     regions: &[Rect],
 ) -> Result<(), Failure> {
     let problem = match &film.pilot {
-        Some(_) if !args.adaptive => "this film was made with --adaptive, and only goes on with it",
-        None if args.adaptive => "this film was made without --adaptive, and only goes on without",
+        Some(_) if !args.adaptive => "this film is adaptive: resume it with --adaptive",
+        None if args.adaptive => "this film is not adaptive: resume it without --adaptive",
         Some(pilot) if !pilot.is_for(regions) => {
-            "this is an adaptive film of other regions, and only goes on with those"
+            "this adaptive film has other regions: resume it with the same --region flags"
         }
         _ => return Ok(()),
     };
     Err(FileError::content(path, problem).into())
 }
 
-/// The sample numbers that every pixel of `regions` is to have in the end.
+/// The sample numbers that every pixel of `regions` shall have at the end.
 pub fn samples(
     args: &RenderArgs,
     settings: &Settings,
@@ -87,8 +86,7 @@ pub fn samples(
     Ok(0..end_for(wanted, regions, held))
 }
 
-/// Samples that a pixel is to have in all, what a film holds included; [`MAX_SAMPLES`] when time or error
-/// alone end the run.
+/// Total samples per pixel, including those in the film. [`MAX_SAMPLES`] if only time or error end the run.
 fn wanted(args: &RenderArgs, settings: &Settings) -> Result<u64, Failure> {
     let by_rays = match args.rays {
         None => None,
@@ -98,7 +96,7 @@ fn wanted(args: &RenderArgs, settings: &Settings) -> Result<u64, Failure> {
                 .ok_or_else(|| {
                     let strata = settings.strata;
                     Failure::Input(format!(
-                        "--rays {rays}: with {strata} x {strata} strata that is more than {MAX_SAMPLES} samples a pixel"
+                        "--rays {rays}: with {strata} x {strata} strata this is more than {MAX_SAMPLES} samples per pixel"
                     ))
                 })?,
         ),
@@ -110,7 +108,7 @@ fn wanted(args: &RenderArgs, settings: &Settings) -> Result<u64, Failure> {
     })
 }
 
-/// The end of the range from 0 that brings every pixel to `wanted` samples, those included that it holds beyond.
+/// The end of the range from 0 that gives every pixel `wanted` samples, counting those that it already has.
 fn end_for(wanted: u64, regions: &[Rect], held: &Coverage) -> u64 {
     let regions = Rect::disjoint(regions);
     let mut end = 0;
@@ -145,32 +143,32 @@ fn end_for_pixel(wanted: u64, ranges: &[Range<u64>]) -> u64 {
     at + lacking
 }
 
-/// `4 surfaces`: primitives and lights, of which every scene has several or one.
+/// The number of primitives and lights, such as `4 surfaces`.
 pub fn things(scene: &Scene) -> String {
     let n = scene.primitives.len() + scene.lights.len();
     let s = if n == 1 { "" } else { "s" };
     format!("{n} surface{s}")
 }
 
-/// `1 sample a pixel`, `2 samples a pixel`.
+/// `1 sample per pixel`, `2 samples per pixel`.
 pub fn count(samples: u64) -> String {
     let s = if samples == 1 { "" } else { "s" };
-    format!("{samples} sample{s} a pixel")
+    format!("{samples} sample{s} per pixel")
 }
 
-/// `120 samples a pixel`, or `119 to 120`.
+/// `120 samples per pixel`, or `119 to 120 samples per pixel`.
 pub fn samples_text(film: &Film) -> String {
     match film.coverage.samples() {
         (a, b) if a == b => count(a),
         (a, b) if film.pilot.is_some() => format!(
-            "{:.1} samples a pixel on average ({a} to {b})",
+            "{:.1} samples per pixel on average ({a} to {b})",
             film.coverage.mean()
         ),
         (a, b) => format!("{a} to {}", count(b)),
     }
 }
 
-/// What will end the run, for the start-up line.
+/// The stop conditions, for the start-up line.
 pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
     let mut conditions = Vec::new();
     if let Some(range) = &args.samples {
@@ -186,7 +184,7 @@ pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
         conditions.push(format!("relative error {}", percent(error)));
     }
     if let Some(time) = args.time {
-        conditions.push(format!("{} of rendering", clock(time.as_secs_f64())));
+        conditions.push(format!("{} of rendering time", clock(time.as_secs_f64())));
     }
     Ok(format!("until {}", conditions.join(", or ")))
 }
@@ -200,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_film_holds_counts() {
+    fn samples_in_the_film_count() {
         let whole = rect(0, 0, 4, 4);
         let end = |held: &[(u64, u64)], wanted| {
             let mut c = Coverage::default();
@@ -219,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_that_hold_nothing_need_all() {
+    fn pixels_without_samples_need_all() {
         let mut c = Coverage::default();
         c.add(rect(0, 0, 2, 4), 0..500);
         assert_eq!(end_for(100, &[rect(0, 0, 4, 4)], &c), 100);

@@ -7,16 +7,16 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-/// Steps of the bar; the last one is never shown before the end.
+/// Length of the bar. It is never full before the end.
 const STEPS: u64 = 1000;
 
-/// Between two lines.
+/// Time between two lines.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
-/// Looking at the error may take this part of the time at most: large pictures are looked at less often.
+/// Computing the error takes at most 1/50 of the time: for large pictures it is computed less often.
 const LOOK_SHARE: u32 = 50;
 
-/// What shows progress.
+/// Shows progress on stderr.
 pub struct Progress {
     shown: Shown,
     looks: Looks,
@@ -24,7 +24,7 @@ pub struct Progress {
 
 /// How it is shown.
 enum Shown {
-    /// Nothing does.
+    /// Not at all.
     Silent,
     /// A line every few seconds, the last one at this time.
     Lines(Instant),
@@ -32,13 +32,13 @@ enum Shown {
     Bar(ProgressBar),
 }
 
-/// Whether progress is a bar, as the flags and the terminal have it.
+/// Whether the flags and the terminal call for a bar.
 pub fn has_bar(talk: &Talk) -> bool {
     !talk.quiet && talk.progress == ProgressStyle::Auto && std::io::stderr().is_terminal()
 }
 
 impl Progress {
-    /// What the flags ask for.
+    /// Progress in the style that the flags select.
     pub fn new(talk: &Talk) -> Self {
         let shown = match talk.progress {
             _ if talk.quiet => Shown::Silent,
@@ -55,7 +55,7 @@ impl Progress {
         Self { shown, looks }
     }
 
-    /// Shows where the run stands that has left `film`.
+    /// Shows the progress of a render.
     pub fn show(&mut self, film: &Film, tally: &Tally) {
         match &mut self.shown {
             Shown::Silent => {}
@@ -73,14 +73,14 @@ impl Progress {
         }
     }
 
-    /// Shows how many of several things are done, and which is next.
+    /// Shows that `done` of `of` steps are done, and the name of the next.
     pub fn step(&mut self, done: usize, of: usize, next: &str) {
         match &mut self.shown {
             Shown::Silent => {}
             Shown::Lines(last) if last.elapsed() < LINE_EVERY => {}
             Shown::Lines(last) => {
                 *last = Instant::now();
-                super::say!("{done} of {of} done, next {next}");
+                super::say!("{done} of {of} done, next: {next}");
             }
             Shown::Bar(bar) => {
                 bar.set_position(STEPS * done as u64 / of.max(1) as u64);
@@ -89,7 +89,7 @@ impl Progress {
         }
     }
 
-    /// Shows the share of the work that is done, and what is being done.
+    /// Shows the fraction of the work that is done, and what is being done.
     pub fn share(&mut self, fraction: f64, text: &str) {
         match &mut self.shown {
             Shown::Silent => {}
@@ -105,7 +105,7 @@ impl Progress {
         }
     }
 
-    /// Does something that writes to the terminal without tearing the bar.
+    /// Calls `f`, which may write to the terminal, with the bar hidden.
     pub fn aside<T>(&self, f: impl FnOnce() -> T) -> T {
         match &self.shown {
             Shown::Bar(bar) => bar.suspend(f),
@@ -113,12 +113,12 @@ impl Progress {
         }
     }
 
-    /// Says something without tearing the bar.
+    /// Prints a line with the bar hidden.
     pub fn say(&self, text: &str) {
         self.aside(|| super::say!("{text}"));
     }
 
-    /// Clears the bar, so that the closing lines stand alone.
+    /// Clears the bar before the command's last lines.
     pub fn finish(&mut self) {
         if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
@@ -126,31 +126,31 @@ impl Progress {
     }
 }
 
-/// A command that fails leaves no bar behind.
+/// Clears the bar if the command fails.
 impl Drop for Progress {
     fn drop(&mut self) {
         self.finish();
     }
 }
 
-/// The picture's relative error as it was looked at last.
+/// The picture's relative error when it was last computed.
 #[derive(Default)]
 struct Looks {
     last: Option<Look>,
 }
 
 struct Look {
-    /// Samples a pixel then.
+    /// Samples per pixel at that time.
     samples: f64,
     error: Option<f64>,
-    /// When it was done, and how long it took.
+    /// When the computation was done, and how long it took.
     done: Instant,
     took: Duration,
 }
 
 impl Looks {
-    /// The picture's relative error in words: as it is now if it is time to look, else what is to be expected since the
-    /// last look. Nothing while some pixels have no samples, for then it is that of a part.
+    /// The picture's relative error as text: computed if that is due, else extrapolated from the last computation. `None`
+    /// while some pixels have no samples.
     fn error(&mut self, film: &Film, tally: &Tally) -> Option<String> {
         if !tally.complete {
             return None;
@@ -169,7 +169,7 @@ impl Looks {
         let look = self.last.as_ref()?;
         let error = look.error?;
         if tally.samples > look.samples {
-            // It falls with the square root of the samples.
+            // The error falls with the square root of the number of samples.
             return Some(format!(
                 "about {}",
                 percent(error * (look.samples / tally.samples).sqrt())
@@ -179,7 +179,7 @@ impl Looks {
     }
 }
 
-/// One line: samples, per cent, error so far, time left. Never says 100 %.
+/// One line: samples, percentage, time left, error. Never says 100 %.
 fn describe(tally: &Tally, error: Option<String>) -> String {
     let mut text = if tally.samples < 10.0 {
         format!("{:.1} samples", (tally.samples * 10.0).floor() / 10.0)
@@ -196,7 +196,7 @@ fn describe(tally: &Tally, error: Option<String>) -> String {
     text
 }
 
-/// Three digits and a per cent sign.
+/// A percentage with three digits.
 pub fn percent(share: f64) -> String {
     let p = share * 100.0;
     if p == 0.0 {
@@ -206,7 +206,7 @@ pub fn percent(share: f64) -> String {
     format!("{p:.digits$} %")
 }
 
-/// Seconds as people say them: 4.2 s, 42 s, 3 min 20 s, 2 h 5 min.
+/// A duration as text: 4.2 s, 42 s, 3 min 20 s, 2 h 5 min.
 pub fn clock(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match whole {
@@ -224,7 +224,7 @@ mod tests {
     use crate::run::Forecast;
 
     #[test]
-    fn a_line_never_says_all_is_done() {
+    fn a_progress_line_never_says_100_percent() {
         let tally = Tally {
             samples: 255.9,
             forecast: Some(Forecast {
@@ -240,9 +240,9 @@ mod tests {
         assert_eq!(describe(&Tally::default(), None), "0.0 samples");
     }
 
-    /// What a large picture's line says between two looks, and that it looks again when that is cheap.
+    /// The error is extrapolated while computing it is expensive, and computed again as soon as it is cheap.
     #[test]
-    fn the_error_is_never_an_old_one() {
+    fn the_shown_error_is_never_out_of_date() {
         let rect = Rect::whole([1, 1]);
         let mut film = Film::new([1, 1], rect, 1);
         film.put_samples(rect, 0..4, vec![[[0.5, 0.5, 0.5, 0.25]; 4]]);
@@ -259,7 +259,11 @@ mod tests {
             }),
         };
         let hour = Duration::from_secs(3600);
-        assert_eq!(looked(hour).error(&film, &tally), None, "of a part alone");
+        assert_eq!(
+            looked(hour).error(&film, &tally),
+            None,
+            "some pixels have no samples"
+        );
         tally.complete = true;
         let between = looked(hour).error(&film, &tally);
         assert_eq!(between.as_deref(), Some("about 10.0 %"));
@@ -269,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn times_and_errors_read_well() {
+    fn durations_and_percentages_as_text() {
         for (seconds, text) in [
             (0.04, "0.0 s"),
             (9.4, "9.4 s"),

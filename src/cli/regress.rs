@@ -20,7 +20,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Runs every case and lists them; exit status 1 when one is not as it was, 2 when one can't be compared.
+/// Runs every case and lists the results. The exit status is 1 if one differs, 2 if one can't be compared.
 pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     backend::check_flags(args.backend, args.adapter.as_deref())?;
     super::set_threads(args.talk.threads);
@@ -33,10 +33,10 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
             Some(filter) => format!("no scene or golden whose name contains \"{filter}\""),
             None => "no scenes (*.toml) and no goldens".into(),
         };
-        return Err(FileError::content(&args.dir, format!("{what}: nothing to compare")).into());
+        return Err(FileError::content(&args.dir, format!("{what}, so nothing to compare")).into());
     }
     check_files(args, &cases)?;
-    // Without the adapter that was asked for no case says anything.
+    // Without the selected adapter every case would fail.
     if let (_, Some(note)) = backend::open(args.backend, args.adapter.as_deref())?
         && !args.talk.quiet
     {
@@ -51,7 +51,7 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     finish(args, &done)
 }
 
-/// Refuses results that would take the place of a scene, a golden, or each other.
+/// Refuses output files that would overwrite a scene, a golden, or each other.
 fn check_files(args: &RegressArgs, cases: &[Case]) -> Result<(), Failure> {
     if args.html.is_none() && args.junit.is_none() {
         return Ok(());
@@ -59,15 +59,15 @@ fn check_files(args: &RegressArgs, cases: &[Case]) -> Result<(), Failure> {
     let mut files = Files::default();
     for case in cases {
         files.reads("a scene", &case.scene_path())?;
-        files.reads("a golden", &case.golden_path())?;
-        files.reads("what a failure leaves", &case.actual_path())?;
-        files.reads("what a failure leaves", &case.report_path())?;
-        // What is wrong with a scene is said in its turn.
+        files.reads("a golden picture", &case.golden_path())?;
+        files.reads("the film of a failed scene", &case.actual_path())?;
+        files.reads("the report of a failed scene", &case.report_path())?;
+        // Errors in a scene are reported when its case runs.
         for path in parse::read(&case.scene_path())
             .iter()
             .flat_map(|s| &s.row_files)
         {
-            files.reads("a file of rows of a scene", path)?;
+            files.reads("a table of a scene", path)?;
         }
     }
     if let Some(path) = &args.html {
@@ -79,7 +79,7 @@ fn check_files(args: &RegressArgs, cases: &[Case]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Every case, `--jobs` at a time; those that a signal cut off are left out.
+/// Runs every case, `--jobs` at a time. Cases that a signal interrupted are left out.
 fn run(args: &RegressArgs, cases: &[Case], signals: &Signals) -> Vec<Done> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());
@@ -155,7 +155,7 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
                 list += &format!("          {line}\n");
             }
             list += &format!(
-                "          see {} and {}; if the change is meant: --bless --filter {}\n",
+                "          see {} and {}; if the change is intended, re-create the golden with --bless --filter {}\n",
                 d.case.report_path().display(),
                 d.case.actual_path().display(),
                 d.case.name

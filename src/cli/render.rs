@@ -1,4 +1,4 @@
-//! `etendue render`: from a scene file to pictures, film and report.
+//! `etendue render`: renders a scene file to pictures, a film and a report.
 
 use super::args::{Backend, RenderArgs};
 use super::backend::{self, Chosen};
@@ -31,7 +31,7 @@ use std::time::Instant;
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let begun = Instant::now();
 
-    // Whatever can be refused is refused now, before the first sample.
+    // Check everything that can be checked before the first sample.
     let outputs = outputs(args);
     let mut files = check_files(args, &outputs)?;
     backend::check_flags(args.backend, args.adapter.as_deref())?;
@@ -39,13 +39,13 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
 
-    // The scene, and the film that may be there already.
+    // Read the scene, and the film if it exists.
     let mut stages = Stages::new(&args.talk);
     stages.begin(format!("reading {}", args.scene.display()));
     let text = parse::read_text(&args.scene)?;
     let scene = parse::parse_str(&args.scene, &text).map_err(Failure::Scene)?;
     for path in &scene.row_files {
-        files.reads("a file of rows of the scene", path)?;
+        files.reads("a table of the scene", path)?;
     }
     let mut settings = Settings::resolve(&scene, &args.overrides());
     let _lock = args.film.as_deref().map(Lock::new).transpose()?;
@@ -61,7 +61,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let regions = plan::regions(args, &settings)?;
     let bounds = plan::bounds(&regions);
     let things = plan::things(&scene);
-    stages.begin(format!("putting {things} in order"));
+    stages.begin(format!("sorting {things}"));
     let ordered = Canonical::new(&scene);
     stages.begin(format!("hashing {things}"));
     let new = Provenance::of(&ordered, text, &settings);
@@ -82,18 +82,18 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     };
     let samples = plan::samples(args, &settings, &regions, &film.coverage)?;
 
-    // The engine, and the kernel if it is to be shown.
-    stages.begin(format!("arranging {things}"));
+    // Make the engine, and write its kernel for --dump-wgsl.
+    stages.begin(format!("preparing {things}"));
     let world = World::of(&ordered, settings.size);
     drop(ordered);
     stages.begin(match args.backend {
-        Backend::Cpu => "preparing the reference",
+        Backend::Cpu => "preparing the CPU reference",
         Backend::Auto | Backend::Gpu => "opening the adapter",
     });
     let adapter = args.adapter.as_deref();
     let mut chosen = backend::choose(args.backend, adapter, &world, &settings, |making| {
         stages.begin(match making {
-            Making::Composing => "composing the kernel".to_owned(),
+            Making::Composing => "generating the kernel".to_owned(),
             Making::Packing => format!("building trees of {things}"),
             Making::Compiling => "compiling the kernel".to_owned(),
         });
@@ -134,8 +134,8 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let tally = run.tally;
     progress.finish();
 
-    // Save what there is, whatever ended the run; pictures only of a run that did not fail, but even if the film
-    // could not be saved: then they are all that is left.
+    // Save the film however the run ended. Write pictures only if the run did not fail, but even if the film could not be
+    // saved: then they are the only result.
     let provenance = saver.provenance(&film, &tally);
     let mut written = Vec::new();
     let mut saved = Ok(());
@@ -187,7 +187,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     }
 }
 
-/// The pictures to write: those named, else STEM.exr and STEM.png in the working directory.
+/// The pictures to write: those of `--output`, else STEM.exr and STEM.png in the working directory.
 fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
     if !args.output.is_empty() {
         return args.output.clone();
@@ -202,7 +202,7 @@ fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
         .to_vec()
 }
 
-/// Refuses files that could not be written in the end, and those that would take another's place.
+/// Refuses outputs that can't be written, and outputs that would overwrite another file.
 fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure> {
     for path in outputs {
         Format::from_path(path).map_err(Failure::Input)?;
@@ -212,13 +212,13 @@ fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure>
     {
         let path = path.display();
         return Err(Failure::Input(format!(
-            "--watch {path}: the picture to follow is a .png"
+            "--watch {path}: the name must end in .png"
         )));
     }
     let mut files = Files::default();
     files.reads("the scene", &args.scene)?;
     let picture = match args.output[..] {
-        [] => "the picture (--output names another)",
+        [] => "the default picture (--output changes it)",
         _ => "--output",
     };
     for path in outputs {
@@ -239,7 +239,7 @@ fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure>
     Ok(files)
 }
 
-/// The film to go on with, if there is one.
+/// The film to resume, if there is one.
 fn load_film(args: &RenderArgs) -> Result<Option<(Film, Provenance)>, Failure> {
     match &args.film {
         Some(path) if path.exists() => Ok(Some(store::load(path)?)),
@@ -247,15 +247,15 @@ fn load_film(args: &RenderArgs) -> Result<Option<(Film, Provenance)>, Failure> {
     }
 }
 
-/// Refuses a film whose samples are not this command's, saying what differs.
+/// Refuses a film whose samples differ from those of this command, and says why.
 fn check_same_samples(path: &Path, held: &Provenance, new: &Provenance) -> Result<(), Failure> {
     held.same_samples(new).map_err(|differ| {
-        let message = format!("this film is of something else; film and command line: {differ}");
+        let message = format!("this film can't be resumed; film and command line: {differ}");
         FileError::content(path, message).into()
     })
 }
 
-/// The start-up line: what, on what, until when.
+/// The start-up line: the scene, the device, and the stop conditions.
 fn say_start(
     args: &RenderArgs,
     scene: &Scene,
@@ -275,7 +275,7 @@ fn say_start(
     let part = if args.region.is_empty() {
         String::new()
     } else {
-        format!(" ({pixels} pixels of it)")
+        format!(" ({pixels} pixels)")
     };
     let device = chosen.engine.device();
     let mut text = format!(
@@ -296,7 +296,7 @@ fn say_start(
     Ok(())
 }
 
-/// A note on a film that was rendered elsewhere.
+/// A note if other devices rendered parts of the film.
 fn say_other_adapters(args: &RenderArgs, held: &Provenance, device: &DeviceInfo) {
     let others: Vec<String> = held
         .devices
@@ -306,7 +306,7 @@ fn say_other_adapters(args: &RenderArgs, held: &Provenance, device: &DeviceInfo)
         .collect();
     if let (Some(path), false) = (&args.film, others.is_empty()) {
         say!(
-            "note: {} holds samples made on {}; {} rounds differently, and the picture is the same up to its noise",
+            "note: {} holds samples from {}; {} rounds differently, so the picture is equal only up to noise",
             path.display(),
             others.join(", "),
             device.name
@@ -325,7 +325,7 @@ fn stop_reason(args: &RenderArgs, reason: StopReason) -> &'static str {
     }
 }
 
-/// The closing lines.
+/// The last lines: samples, time, speed, error, and the files written.
 fn say_end(
     film: &Film,
     provenance: &Provenance,
@@ -338,14 +338,14 @@ fn say_end(
         text += "interrupted: ";
     }
     if film.coverage.is_empty() {
-        say!("{text}nothing rendered, nothing written");
+        say!("{text}no samples rendered, no files written");
         return;
     }
     text += &plan::samples_text(film);
     text += &format!(" in {}", clock(tally.seconds));
     if tally.seconds > 0.0 {
         let speed = tally.counters.paths as f64 / tally.seconds / 1e6;
-        text += &format!(" ({speed:.3} million paths a second)");
+        text += &format!(" ({speed:.3} million paths per second)");
     }
     if let Some(error) = provenance.relative_error {
         text += &format!(", relative error {}", percent(error));
@@ -354,16 +354,16 @@ fn say_end(
     say!("wrote {}", written.join(", "));
 }
 
-/// Of paths that are cut, a smaller share than this makes no picture visibly darker: the report alone has their number.
+/// If fewer paths than this share are truncated, the picture is not visibly darker, so only the report gives their number.
 const CUT_SHARE: f64 = 1e-5;
 
-/// What the user must know about the picture.
+/// Warnings about the picture.
 fn warn(settings: &Settings, counters: &Counters, film: &Film, provenance: &Provenance) {
     let share = counters.truncated as f64 / counters.paths.max(1) as f64;
     if share > CUT_SHARE && settings.max_depth_is_default {
         say!(
-            "warning: {} of {} paths ({}) were cut after {} vertices, and the picture can be darker for it, by about that \
-             share; --max-depth N allows more",
+            "warning: {} of {} paths ({}) were truncated after {} vertices, which can darken the picture by about that \
+             fraction; raise the limit with --max-depth N",
             counters.truncated,
             counters.paths,
             percent(share),
@@ -374,15 +374,15 @@ fn warn(settings: &Settings, counters: &Counters, film: &Film, provenance: &Prov
         && film.heavy_tail().is_some_and(|tail| tail.unsafe_mean)
     {
         say!(
-            "warning: the true error may be above the stated {}, often by a fifth or more: much of it lies in rare bright samples \
-             (light that glass or mirrors focus, for one), of which few have been met yet; more samples will tell (--spp, \
-             --time)",
+            "warning: the true relative error may exceed the stated {}, often by 20 % or more: much of it comes from rare \
+             bright samples (such as light focused by glass or mirrors), few of which have been taken so far; take more samples \
+             (--spp, --time)",
             percent(error)
         );
     }
     if let Some((x, y, sample)) = counters.first_nonfinite {
         say!(
-            "warning: {} samples were not finite and are left out, the first at pixel {x}, {y}, sample {sample}; \
+            "warning: {} samples were not finite and were left out, the first at pixel {x}, {y}, sample {sample}; \
              this is a bug, please report the scene",
             counters.nonfinite
         );

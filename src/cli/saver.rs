@@ -1,4 +1,4 @@
-//! What is written while a render goes on: the film's checkpoints and the picture to follow.
+//! Writes files during a render: checkpoints of the film, and the `--watch` picture.
 
 use super::args::RenderArgs;
 use super::progress::Progress;
@@ -9,19 +9,19 @@ use crate::provenance::Provenance;
 use crate::run::{self, Tally};
 use std::time::{Duration, Instant};
 
-/// Between two checkpoints when the command line does not say.
+/// Default time between two checkpoints.
 const CHECKPOINT: Duration = Duration::from_secs(60);
 
-/// Between two pictures to follow, at least.
+/// Shortest time between two `--watch` pictures.
 const WATCH: Duration = Duration::from_secs(2);
 
-/// The picture to follow may take this part of the time at most: large ones are written less often.
+/// Writing the `--watch` picture takes at most 1/20 of the time: large ones are written less often.
 const WATCH_SHARE: u32 = 20;
 
-/// Writes files at their intervals.
+/// Writes each file at its interval.
 pub struct Saver<'a> {
     args: &'a RenderArgs,
-    /// What the film came from before this run.
+    /// The film's provenance before this run.
     before: &'a Provenance,
     device: &'a DeviceInfo,
     checkpoint: Timer,
@@ -29,7 +29,7 @@ pub struct Saver<'a> {
 }
 
 impl<'a> Saver<'a> {
-    /// For a run on `device` that goes on from `before`.
+    /// For a run on `device` that resumes from `before`.
     pub fn new(args: &'a RenderArgs, before: &'a Provenance, device: &'a DeviceInfo) -> Self {
         Self {
             args,
@@ -40,7 +40,7 @@ impl<'a> Saver<'a> {
         }
     }
 
-    /// The film's provenance, this run included.
+    /// The film's provenance, including this run.
     pub fn provenance(&self, film: &Film, tally: &Tally) -> Provenance {
         let mut provenance = self.before.clone();
         provenance.add_work(self.device, tally.counters, tally.seconds);
@@ -48,8 +48,8 @@ impl<'a> Saver<'a> {
         provenance
     }
 
-    /// Writes what is due. A file that can't be written now is warned of, not fatal: hours of rendering
-    /// are worth more than this checkpoint, and the next may succeed.
+    /// Writes the files that are due. If one can't be written, prints a warning and goes on: hours of rendering are worth
+    /// more than this checkpoint, and the next may succeed.
     pub fn meanwhile(&mut self, film: &Film, tally: &Tally, progress: &Progress) {
         if self.checkpoint.is_due()
             && let Some(path) = self.args.film.as_deref()
@@ -70,7 +70,7 @@ impl<'a> Saver<'a> {
     }
 }
 
-/// The longest call to the engine that leaves a checkpoint every so often possible.
+/// The longest call to the engine that still allows a checkpoint at every interval.
 pub fn longest_call(args: &RenderArgs) -> Duration {
     match (&args.film, args.checkpoint) {
         (Some(_), Some(interval)) => run::CALL.min(interval / 4),
@@ -78,14 +78,14 @@ pub fn longest_call(args: &RenderArgs) -> Duration {
     }
 }
 
-/// Says when something is due.
+/// Decides when a file is due.
 struct Timer {
     interval: Duration,
-    /// When it was begun last.
+    /// When the last save began.
     began: Instant,
-    /// How long it took then.
+    /// How long the last save took.
     took: Duration,
-    /// When it was last asked whether it is due.
+    /// When `is_due` was last called.
     asked: Instant,
 }
 
@@ -116,10 +116,9 @@ impl Timer {
     }
 }
 
-/// Whether a film that was last saved as it stood `since` ago, which took `took`, is to be saved now, when the next
-/// chance comes about a `call` later. Until a save is complete a kill costs everything since the one before was begun:
-/// all of that is to fit into the interval. Saves that take longer than half of it leave as much time to render as
-/// they take.
+/// Whether to save the film now. The last save began `since` ago and took `took`; the next chance comes a `call` later.
+/// If the process is killed before this save is complete, everything since the last one began is lost, and that must not
+/// exceed the interval. Saves that take longer than half the interval leave at least as much time for rendering.
 fn is_due(interval: Duration, since: Duration, call: Duration, took: Duration) -> bool {
     since + call + took >= interval && since >= 2 * took
 }
@@ -128,7 +127,7 @@ fn is_due(interval: Duration, since: Duration, call: Duration, took: Duration) -
 mod tests {
     use super::*;
 
-    /// The most that a kill can cost, and the share of time spent on saving, when calls and saves always take as long.
+    /// The longest rendering that a kill can lose, and the share of time spent on saving, for constant `call` and `took`.
     fn simulate(interval: u64, call: u64, took: u64) -> (Duration, f64) {
         let [interval, call, took] = [interval, call, took].map(Duration::from_millis);
         let (mut now, mut began, mut last_took) = (Duration::ZERO, Duration::ZERO, Duration::ZERO);
@@ -140,13 +139,13 @@ mod tests {
                 (began, last_took) = (now, took);
                 now += took;
                 saves += 1;
-                // The first one comes without knowledge of how long it takes.
+                // The duration of the first save was not known in advance.
                 if saves > 1 {
                     worst = worst.max(now - before);
                 }
             }
         }
-        // Time is up in the midst of a turn: its save is left out.
+        // The last turn is incomplete: leave its save out.
         (
             worst,
             ((saves - 1) * took).as_secs_f64() / now.as_secs_f64(),
@@ -154,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_kill_costs_at_most_an_interval_and_saving_at_most_half_of_the_time() {
+    fn a_kill_loses_at_most_an_interval_and_saving_takes_at_most_half_the_time() {
         for (interval, call, took) in [
             (60_000, 400, 100),
             (60_000, 400, 20_000),
@@ -165,11 +164,11 @@ mod tests {
             let (worst, share) = simulate(interval, call, took);
             let interval = Duration::from_millis(interval);
             assert!(worst <= interval, "{worst:?} of {interval:?}");
-            // And it is not saved more often than that takes.
+            // And it is not saved more often than necessary.
             assert!(worst >= interval / 2, "{worst:?} of {interval:?}");
             assert!(share <= 0.5, "{share}");
         }
-        // A disk too slow for the interval: half of the time is left for rendering.
+        // The disk is too slow for the interval: half of the time is left for rendering.
         let (worst, share) = simulate(1000, 100, 3000);
         assert!((0.45..=0.5).contains(&share), "{share}");
         assert!(worst <= Duration::from_millis(9100), "{worst:?}");

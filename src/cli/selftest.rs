@@ -8,7 +8,7 @@ use super::{backend, say};
 use crate::selftest::{Backend, Case, Measure, Trouble, cases};
 use std::time::Instant;
 
-/// Runs the cases and prints a line for every quantity as soon as its case is done.
+/// Runs the cases and prints a line for every quantity as soon as its case has run.
 pub fn selftest(args: &SelftestArgs) -> Result<(), Failure> {
     let begun = Instant::now();
     backend::check_flags(args.backend, args.adapter.as_deref())?;
@@ -64,7 +64,7 @@ pub fn selftest(args: &SelftestArgs) -> Result<(), Failure> {
         chosen.len()
     ))?;
     if !args.talk.quiet {
-        say!("{}", clock(begun.elapsed().as_secs_f64()));
+        say!("finished in {}", clock(begun.elapsed().as_secs_f64()));
     }
     if failed > 0 {
         return Err(Failure::Said(1));
@@ -81,23 +81,23 @@ fn choose_cases(filter: Option<&str>) -> Result<Vec<Case>, Failure> {
     if chosen.is_empty() {
         let names: Vec<String> = cases().iter().map(Case::id).collect();
         return Err(Failure::Input(format!(
-            "no case contains {wanted:?}; there are: {}",
+            "no case contains {wanted:?}; the cases are: {}",
             names.join(", ")
         )));
     }
     Ok(chosen)
 }
 
-/// How lines look.
+/// The layout of the table.
 struct Table {
     markdown: bool,
 }
 
-/// Widths of the columns but the last; longer texts push the rest of their line.
+/// Column widths except for the last. A longer text shifts the rest of its line.
 const WIDTHS: [usize; 6] = [3, 29, 58, 22, 11, 14];
 
 impl Table {
-    /// What is tested, and the names of the columns.
+    /// The device under test, and the column names.
     fn head(&self, backend: &Backend) -> String {
         let device = backend.device();
         let version = env!("CARGO_PKG_VERSION");
@@ -118,7 +118,7 @@ impl Table {
         text
     }
 
-    /// The lines of one case; in Markdown the first says what it is about.
+    /// The lines of one case. In Markdown the first has its description.
     fn lines(&self, case: &Case, measures: &[Measure]) -> String {
         let mut text = String::new();
         for (k, m) in measures.iter().enumerate() {

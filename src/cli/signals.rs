@@ -1,23 +1,23 @@
-//! Ctrl-C, SIGTERM and SIGHUP as a flag that the render loop reads; a second signal ends the process at once. And the
-//! signal that must not end it.
+//! Signal handlers. Ctrl-C, SIGTERM and SIGHUP set a flag that the render loop reads, and a second signal ends the process at
+//! once. SIGXFSZ must not end the process.
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::{fs, io};
 
-/// A write beyond the limit on file sizes (`ulimit -f`) then fails like one to a full disk, with a message, instead of
-/// ending the process.
+/// Handles SIGXFSZ, so that a write beyond the file size limit (`ulimit -f`) fails with a message, like one to a full disk,
+/// instead of ending the process.
 pub fn outlive_size_limits() {
-    // Nobody reads the flag. Where there is no handler, the limit is as deadly as it was.
+    // Nobody reads the flag. If the handler can't be installed, the signal still ends the process.
     let _ = signal_hook::flag::register(SIGXFSZ, Arc::default());
 }
 
-/// The signals' handlers, installed for the rest of the process.
+/// Handlers that stay installed for the rest of the process.
 pub struct Signals {
     /// Set by the first signal.
     pub stop: Arc<AtomicBool>,
-    /// Its number; 0 before.
+    /// The number of that signal; 0 before it.
     number: Arc<AtomicUsize>,
 }
 
@@ -26,7 +26,7 @@ impl Signals {
     pub fn install() -> io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let number = Arc::new(AtomicUsize::new(0));
-        // What a terminal that goes away sends; `nohup` has it ignored, and so it stays then.
+        // A terminal sends SIGHUP when it closes. `nohup` makes the process ignore it, and that must stay so.
         let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
         for signal in [SIGINT, SIGTERM].into_iter().chain(hang_up) {
             // Handlers run in this order: the first signal finds `stop` unset and sets it.
@@ -47,8 +47,8 @@ impl Signals {
     }
 }
 
-/// Whether the process was started with this signal ignored. Where the system does not tell (Linux does), so that a handler
-/// could undo it: as if it were.
+/// Whether the process was started with this signal ignored. Only Linux tells; elsewhere the answer is yes, since a handler
+/// would undo it.
 fn is_ignored(signal: i32) -> bool {
     let mask = || {
         let status = fs::read_to_string("/proc/self/status").ok()?;

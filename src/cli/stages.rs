@@ -1,4 +1,4 @@
-//! What is under way before the first sample, on a terminal: a scene of a million things takes its time.
+//! Shows on a terminal what happens before the first sample, which takes seconds for a scene with a million objects.
 
 use super::args::Talk;
 use super::progress::{clock, has_bar};
@@ -8,20 +8,20 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A stage that takes no longer is not shown.
+/// A shorter stage is not shown.
 const PATIENCE: Duration = Duration::from_millis(300);
 
-/// Between two turns of the spinner.
+/// Time between two frames of the spinner.
 const TURN: Duration = Duration::from_millis(100);
 
-/// Stages of a command, one after the other; shows those that take long.
+/// The stages of a command, one at a time. Shows those that take long.
 pub struct Stages {
     shown: bool,
     now: Option<Stage>,
 }
 
 impl Stages {
-    /// Shown where progress is a bar.
+    /// Shows stages where progress is a bar.
     pub fn new(talk: &Talk) -> Self {
         Self {
             shown: has_bar(talk),
@@ -29,22 +29,22 @@ impl Stages {
         }
     }
 
-    /// Ends the stage under way, and begins another.
+    /// Ends the current stage and begins another.
     pub fn begin(&mut self, name: impl Into<String>) {
         self.end();
         self.now = self.shown.then(|| Stage::new(name.into()));
     }
 
-    /// Ends the stage under way, so that something else can be said.
+    /// Ends the current stage, so that other lines can be printed.
     pub fn end(&mut self) {
         self.now = None;
     }
 }
 
-/// A stage under way, until it is dropped.
+/// The current stage, which ends when it is dropped.
 struct Stage {
     bar: ProgressBar,
-    /// Dropped when the stage ends, which the thread that waits for its time hears.
+    /// Dropped when the stage ends, which wakes the waiting thread.
     ended: Option<Sender<()>>,
     waiting: Option<JoinHandle<()>>,
 }

@@ -1,14 +1,14 @@
-//! Values of flags: each parser's error quotes nothing but the rule, since clap names flag and value. Flags whose values
-//! these read take what begins with a hyphen, so that -1 is told the rule and not taken for another flag.
+//! Parsers of flag values. Their errors state only the rule, since clap names the flag and the value. These flags accept
+//! values that begin with a hyphen, so that -1 gets the rule and is not mistaken for another flag.
 
 use crate::film::coverage::Rect;
 use crate::settings::LightParts;
 use std::ops::Range;
 use std::time::Duration;
 
-/// A length of time: `90s`, `2m`, `1h30m`, `0.5s`, or plain seconds; more than 0, at most a year.
+/// A duration: `90s`, `2m`, `1h30m`, `0.5s`, or plain seconds; more than 0, at most a year.
 pub fn duration(text: &str) -> Result<Duration, String> {
-    const RULE: &str = "expected a time such as 90s, 2m, 1h30m or plain seconds";
+    const RULE: &str = "expected a duration such as 90s, 2m, 1h30m or plain seconds";
     const YEAR: f64 = 366.0 * 86400.0;
     let mut seconds = 0.0;
     let mut rest = text;
@@ -33,7 +33,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
             "" if end == text.len() => 1.0,
             _ => return Err(RULE.into()),
         };
-        // Large units come first, so that 5s2m is not taken for a slip of the finger.
+        // Larger units must come first: 5s2m is probably a typing error.
         if unit >= last_unit {
             return Err(RULE.into());
         }
@@ -44,7 +44,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
     if seconds > 0.0 && seconds <= YEAR {
         Ok(Duration::from_secs_f64(seconds))
     } else {
-        Err("a time is more than 0 and at most a year".into())
+        Err("expected a duration of more than 0 and at most a year".into())
     }
 }
 
@@ -62,7 +62,7 @@ pub fn relative_error(text: &str) -> Result<f64, String> {
     if value > 0.0 && value <= 1.0 {
         Ok(value)
     } else {
-        Err("a relative error is more than 0 and at most 1 (100%)".into())
+        Err("expected a relative error of more than 0 and at most 1 (100%)".into())
     }
 }
 
@@ -104,10 +104,10 @@ pub fn seed() -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync {
     whole(0, u32::MAX.into())
 }
 
-/// Part of an adapter's name: nothing is part of every name.
+/// Part of an adapter's name. Refuses an empty text, which every name contains.
 pub fn part_of_name(text: &str) -> Result<String, String> {
     match text.trim() {
-        "" => Err("expected a part of an adapter's name; etendue adapters lists them".into()),
+        "" => Err("expected part of an adapter's name, see: etendue adapters".into()),
         name => Ok(name.into()),
     }
 }
@@ -132,14 +132,14 @@ pub fn limit(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The most samples that a pixel can have: they are numbered in 32 bits.
+/// Most samples that a pixel can have: sample numbers have 32 bits.
 pub const MAX_SAMPLES: u64 = u32::MAX as u64;
 
 /// A number of samples, 1..=[`MAX_SAMPLES`].
 pub fn samples(text: &str) -> Result<u64, String> {
     match text.parse::<u64>() {
         Ok(n) if (1..=MAX_SAMPLES).contains(&n) => Ok(n),
-        _ => Err(format!("expected a whole number, 1 to {MAX_SAMPLES}")),
+        _ => Err(format!("expected a whole number from 1 to {MAX_SAMPLES}")),
     }
 }
 
@@ -147,7 +147,7 @@ pub fn samples(text: &str) -> Result<u64, String> {
 pub fn sample_range(text: &str) -> Result<Range<u64>, String> {
     let (a, b) = text
         .split_once("..")
-        .ok_or("expected A..B, the samples numbered A to B-1, such as 0..256")?;
+        .ok_or("expected A..B for samples A to B-1, such as 0..256")?;
     let number = |s: &str| {
         s.parse::<u64>()
             .ok()
@@ -158,7 +158,7 @@ pub fn sample_range(text: &str) -> Result<Range<u64>, String> {
     if range.start < range.end {
         Ok(range)
     } else {
-        Err("of A..B, A must be less than B".into())
+        Err("in A..B, A must be less than B".into())
     }
 }
 
@@ -182,21 +182,21 @@ pub fn rect(text: &str) -> Result<Rect, String> {
         .split(',')
         .map(|s| s.trim().parse::<u32>())
         .collect::<Result<_, _>>()
-        .map_err(|_| "expected X0,Y0,X1,Y1 in whole pixels, such as 0,0,256,192")?;
+        .map_err(|_| "expected X0,Y0,X1,Y1 in pixels, such as 0,0,256,192")?;
     let [x0, y0, x1, y1] = numbers[..] else {
         return Err(format!(
-            "expected the four numbers X0,Y0,X1,Y1, found {}",
+            "expected four numbers X0,Y0,X1,Y1, found {}",
             numbers.len()
         ));
     };
     if x0 < x1 && y0 < y1 {
         Ok(Rect { x0, y0, x1, y1 })
     } else {
-        Err("a region is half-open: X0 must be less than X1, and Y0 less than Y1".into())
+        Err("X0 must be less than X1, and Y0 less than Y1 (X1 and Y1 are exclusive)".into())
     }
 }
 
-/// A list of `emitted`, `direct`, `indirect`, by commas.
+/// A list of `emitted`, `direct`, `indirect`, separated by commas.
 pub fn light(text: &str) -> Result<LightParts, String> {
     let mut parts = LightParts {
         emitted: false,
@@ -210,7 +210,7 @@ pub fn light(text: &str) -> Result<LightParts, String> {
             "indirect" => &mut parts.indirect,
             other => {
                 return Err(format!(
-                    "\"{other}\" is none of emitted, direct, indirect (several by commas)"
+                    "\"{other}\" is none of emitted, direct, indirect (separate several by commas)"
                 ));
             }
         };
@@ -219,7 +219,7 @@ pub fn light(text: &str) -> Result<LightParts, String> {
     Ok(parts)
 }
 
-/// A finite number of stops, -100..=100: beyond that no 8-bit picture shows anything.
+/// A finite number of stops, -100..=100. Beyond that every 8-bit picture is black or white.
 pub fn exposure(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(ev) if ev.abs() <= 100.0 => Ok(ev),

@@ -1,8 +1,8 @@
-//! FLIP: what an observer sees who flips between two pictures, 0 for nothing and 1 for the most, per pixel
+//! FLIP: the difference per pixel that an observer sees who flips between two pictures, from 0 (none) to 1 (largest)
 //! [Andersson2020].
 //!
-//! Written out here because the one crate for it wraps a C++ library of 2022, which would make everybody who builds
-//! this program need a C++ compiler. Held against the authors' own implementation in this module's tests.
+//! Implemented here because the only crate for it wraps a C++ library, so that building this program would need a C++
+//! compiler. The tests compare it with the authors' implementation.
 
 use std::f64::consts::PI;
 
@@ -140,7 +140,7 @@ fn normalised(kernel: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The picture correlated with `across` in rows and `down` in columns; the edge goes on for ever.
+/// The picture correlated with `across` in rows and `down` in columns; the edge pixels are repeated.
 fn separable(size: [u32; 2], picture: &[f64], across: &[f64], down: &[f64]) -> Vec<f64> {
     let [width, height] = size.map(|n| n as usize);
     let pass = |from: &[f64], kernel: &[f64], count: usize, step: usize, at: usize| -> f64 {

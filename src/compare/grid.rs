@@ -1,15 +1,15 @@
-//! Sums over blocks of pixels, as the tests want them.
+//! Sums over blocks of pixels, for the tests of the verdict.
 
 use super::picture::Picture;
 use super::verdict::{Block, Kind, ROUNDING};
 use crate::film::coverage::Rect;
 use crate::stats::luminance;
 
-/// Noise that a pixel is never divided by less of, as a share of the picture's mean variance: pixels without
-/// noise, a lamp's say, would else outweigh all others.
+/// Lower limit of the variance by which a pixel is divided, as a fraction of the picture's mean variance. Without it, pixels
+/// without noise (such as those of a lamp) would outweigh all others.
 const LEAST_VARIANCE: f64 = 1e-3;
 
-/// What a channel says in each pixel; all 0 where nothing was rendered.
+/// One channel of both pictures; all 0 in pixels without samples.
 pub(super) struct Terms {
     size: [u32; 2],
     means: Vec<[f64; 2]>,
@@ -50,8 +50,8 @@ impl Terms {
         for i in (0..pixels).filter(|&i| a.covered[i]) {
             let [n, m] = [na.samples[i], nb.samples[i]].map(|n| n as f64);
             let (mut va, mut vb) = (na.error[i][channel].powi(2), nb.error[i][channel].powi(2));
-            // A sample of either has the same variance if both are made alike, and the better sampled picture
-            // knows it better: what it has met is lacking by chance in the other.
+            // Samples of both pictures have the same variance if both were rendered alike. The picture with more samples
+            // estimates it better: rare bright samples may be missing from the other.
             if va * n / m + vb * m / n > va + vb {
                 (va, vb) = (va * n / m, vb * m / n);
             }

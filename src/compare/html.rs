@@ -1,4 +1,4 @@
-//! A comparison as one page that needs nothing beside it.
+//! A comparison as a self-contained HTML page.
 
 use super::flip::encode_srgb;
 use super::text::{self, CHANNELS};
@@ -267,8 +267,8 @@ fn sensitivity(comparison: &Comparison) -> String {
         return String::new();
     };
     let mut s = format!(
-        "<h2>What would have been seen</h2><p class=\"soft\">Of {} tests with {} false alarms allowed in all, the \
-         relative change of light that they find with 95 % probability; for blocks, in half of them.</p><table>",
+        "<h2>Detectable changes</h2><p class=\"soft\">The relative change of brightness that the tests detect with 95 % \
+         probability; for blocks, in half of them. Number of tests: {}; overall false-alarm rate: {}.</p><table>",
         v.tests,
         text::brief(v.alpha)
     );
@@ -374,7 +374,7 @@ fn histogram(values: &[f64], range: f64, normal: bool) -> String {
         );
     }
     let caption = if normal {
-        "counts on a logarithmic scale; the curve is what noise alone would give if it were normal"
+        "counts on a logarithmic scale; the curve is the expected histogram for normal noise"
     } else {
         "counts on a logarithmic scale"
     };

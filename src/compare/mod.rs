@@ -1,7 +1,7 @@
-//! Are two pictures the same up to their noise?
+//! Tests whether two pictures are equal up to their noise.
 //!
-//! Pictures that state their noise get a [`Verdict`]: no threshold but the rate of false alarms. Others are
-//! held against limits that the user gives, on [`Metrics`] that cannot tell noise from a difference.
+//! Pictures with error layers get a [`Verdict`], whose only threshold is the false-alarm rate. For others the user gives
+//! limits on [`Metrics`], which can't distinguish noise from a difference.
 
 pub mod flip;
 mod grid;
@@ -58,7 +58,7 @@ pub struct Comparison {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Incomparable {
     /// Their sizes differ.
-    #[error("{a} has {} x {} pixels, {b} has {} x {}", .sizes[0][0], .sizes[0][1], .sizes[1][0], .sizes[1][1])]
+    #[error("{a} has {} x {} pixels, but {b} has {} x {}", .sizes[0][0], .sizes[0][1], .sizes[1][0], .sizes[1][1])]
     Size {
         /// Name of A.
         a: String,
@@ -69,7 +69,7 @@ pub enum Incomparable {
     },
     /// Their pixels without samples are not the same.
     #[error(
-        "pixel ({x}, {y}) has samples in {with} and none in {without}; compare pictures of the same regions"
+        "pixel ({x}, {y}) has samples in {with}, but none in {without}; compare pictures of the same regions"
     )]
     Regions {
         /// Column.
@@ -83,8 +83,8 @@ pub enum Incomparable {
     },
     /// No verdict is possible, and there are no limits.
     #[error(
-        "{name} does not state its noise (it lacks error layers, samples, or two independent replicates), so only \
-         limits can decide: give --max-flip or --max-relative-rmse"
+        "{name} does not state its noise (it has no error layers, no sample counts, or fewer than two replicates), so a \
+         limit is needed: use --max-flip or --max-relative-rmse"
     )]
     NoNoise {
         /// The picture without error layers.
@@ -109,7 +109,7 @@ pub fn compare(a: &Picture, b: &Picture, limits: &Limits) -> Result<Comparison, 
     let metrics = Metrics::new(a, b);
     let over = |what: &str, value: f64, limit: Option<f64>| {
         let limit = limit.filter(|limit| value.is_nan() || value > *limit)?;
-        Some(format!("{what} is {value:.4}, the limit {limit}"))
+        Some(format!("{what} is {value:.4}, above the limit {limit}"))
     };
     let exceeded = [
         over("mean FLIP", metrics.flip, limits.max_flip),
@@ -154,13 +154,13 @@ fn notes(a: &Picture, b: &Picture) -> Vec<String> {
     if let Some((x, y)) = both("scene_hash")
         && x != y
     {
-        notes.push("the pictures are of different scenes or settings, by their hashes".into());
+        notes.push("the pictures are of different scenes or settings (their hashes differ)".into());
     }
     if let Some((x, y)) = both("seed")
         && x == y
     {
         notes.push(format!(
-            "both were made with seed {x}: what one has missed by chance the other has missed too; render one with \
+            "both were rendered with seed {x}, so both may miss the same rare light paths; render one with \
              another --seed"
         ));
     }

@@ -7,7 +7,7 @@ use crate::provenance::Provenance;
 use std::io::{BufReader, Read as _};
 use std::path::Path;
 
-/// A picture with what is known of its noise.
+/// A picture and its noise, if known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     /// Where it is from, for messages.
@@ -18,9 +18,9 @@ pub struct Picture {
     pub rgb: Vec<[f64; 3]>,
     /// Whether a pixel was rendered.
     pub covered: Vec<bool>,
-    /// What is known of its noise.
+    /// Its noise, if known.
     pub noise: Option<Noise>,
-    /// What its header tells of its origin, by key.
+    /// The metadata in its header, by key.
     pub origin: Vec<(String, String)>,
 }
 
@@ -61,18 +61,18 @@ impl Picture {
             Some("png") => Self::from_png(path),
             _ => Err(FileError::content(
                 path,
-                "a picture to compare is an .exr, a .npz (film) or a .png",
+                "not a picture that can be compared (.exr, .png, or .npz film)",
             )),
         }
     }
 
-    /// What a header says under `key`.
+    /// The header's value of `key`.
     pub fn origin(&self, key: &str) -> Option<&str> {
         let entry = self.origin.iter().find(|(k, _)| k == key)?;
         Some(&entry.1)
     }
 
-    /// A film as it now stands. The error says why there is nothing to compare.
+    /// A film as a picture. The error says why it can't be compared.
     pub fn from_film(name: String, film: &Film, provenance: &Provenance) -> Result<Self, String> {
         let pixels = Pixels::new(film);
         let [width, height] = film.size;
@@ -111,9 +111,11 @@ impl Picture {
         let exr = read_exr(path)?;
         let wrong = |why: String| FileError::content(path, why);
         let replicates = match exr.attributes.get("replicates") {
-            Some(text) => text
-                .parse::<u32>()
-                .map_err(|_| wrong(format!("its header says replicates = {text}")))?,
+            Some(text) => text.parse::<u32>().map_err(|_| {
+                wrong(format!(
+                    "its header has the invalid value replicates = {text}"
+                ))
+            })?,
             None => 0,
         };
         let covered: Vec<bool> = match &exr.samples {
@@ -139,18 +141,18 @@ impl Picture {
         picture.not_empty().map_err(wrong)
     }
 
-    /// 8 or 16 bits a channel; grey is taken for R = G = B, and alpha says only what is covered.
+    /// 8 or 16 bits per channel; grey is taken for R = G = B, and alpha says only what is covered.
     fn from_png(path: &Path) -> Result<Self, FileError> {
         let wrong = |e: png::DecodingError| match e {
             png::DecodingError::IoError(e) => FileError::reading(path, &e),
-            other => FileError::content(path, format!("no usable PNG: {other}")),
+            other => FileError::content(path, format!("invalid PNG: {other}")),
         };
         let mut decoder = png::Decoder::new(BufReader::new(open(path)?));
         decoder.set_transformations(png::Transformations::normalize_to_color8());
         let mut reader = decoder.read_info().map_err(wrong)?;
         let bytes = reader
             .output_buffer_size()
-            .ok_or_else(|| FileError::content(path, "too large"))?;
+            .ok_or_else(|| FileError::content(path, "the picture is too large"))?;
         let mut data = vec![0; bytes];
         let info = reader.next_frame(&mut data).map_err(wrong)?;
         reader.finish().map_err(wrong)?;
@@ -191,7 +193,7 @@ impl Picture {
         if self.covered.contains(&true) {
             Ok(self)
         } else {
-            Err("no pixel has a sample: there is nothing to compare".into())
+            Err("no pixel has samples, so there is nothing to compare".into())
         }
     }
 }

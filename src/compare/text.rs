@@ -11,15 +11,15 @@ impl Comparison {
     pub fn sentence(&self) -> String {
         let exceeded = self.exceeded.join("; ");
         match &self.verdict {
-            Some(v) if self.identical && v.same() => "the same to the bit".into(),
+            Some(v) if self.identical && v.same() => "bit-identical".into(),
             Some(v) if exceeded.is_empty() => verdict_sentence(v),
             Some(v) if v.same() => format!(
-                "different by the limits given ({exceeded}), which count noise as a difference; without them {}",
+                "different by the given limits ({exceeded}), which count noise as a difference; without them: {}",
                 verdict_sentence(v)
             ),
-            Some(v) => format!("{}; and by the limits given ({exceeded})", verdict_sentence(v)),
+            Some(v) => format!("{}; also different by the given limits ({exceeded})", verdict_sentence(v)),
             None if exceeded.is_empty() => {
-                "within the limits (the pictures do not state their noise, so this is no statistical verdict)".into()
+                "within the limits (not a statistical test, since the pictures do not state their noise)".into()
             }
             None => format!("different: {exceeded}"),
         }
@@ -67,14 +67,14 @@ impl Comparison {
 fn verdict_sentence(v: &Verdict) -> String {
     let alpha = brief(v.alpha);
     if v.same() {
-        let mut text = format!("the same up to their noise (false alarms: {alpha})");
+        let mut text = format!("equal up to noise (false-alarm rate {alpha})");
         let told: Vec<String> = v.sensitivity.iter().filter_map(seen).take(3).collect();
         match told.split_last() {
-            Some((last, [])) => text += &format!("; {last} would have been seen"),
+            Some((last, [])) => text += &format!("; would have detected {last}"),
             Some((last, rest)) => {
-                text += &format!("; {} or {last} would have been seen", rest.join(", "));
+                text += &format!("; would have detected {} or {last}", rest.join(", "));
             }
-            None => text += "; but so noisy that hardly any change would have been seen",
+            None => text += "; but too noisy to detect most changes",
         }
         text
     } else {
@@ -84,7 +84,7 @@ fn verdict_sentence(v: &Verdict) -> String {
             format!("{:.0e}", v.p)
         };
         let first = v.findings.first().map(place).unwrap_or_default();
-        format!("different {first}: equal pictures look so with probability {p} (limit {alpha})")
+        format!("different {first}: the probability for equal pictures is {p} (limit {alpha})")
     }
 }
 
@@ -101,7 +101,7 @@ pub(super) fn brief(p: f64) -> String {
 fn seen(s: &Sensitivity) -> Option<String> {
     let change = percent(Some(s.change).filter(|c| *c < 1.0)?);
     Some(match s.side {
-        0 => format!("a change of all light by {change}"),
+        0 => format!("a change of the whole picture's brightness by {change}"),
         side => format!("of {side}x{side} pixels by {change}"),
     })
 }

@@ -1,25 +1,25 @@
-//! Whether two pictures differ by more than their noise.
+//! Tests whether two pictures differ by more than their noise.
 //!
 //! Blocks of pixels of every dyadic side, from one pixel to the whole picture, are tested in each channel. Let
-//! d be the difference of the two pictures in a pixel and v its variance as the pictures state it. A sample that
-//! is rare and bright (a caustic) makes v a poor witness: where it was missed, v is too small; where it was met
-//! equally often in every replicate, v is nearly 0. So no test leans on v alone.
+//! d be the difference of the two pictures in a pixel, and v its variance as the pictures state it. With rare bright
+//! samples (a caustic), v is unreliable: if they were missed, v is too small; if every replicate has equally many, v is
+//! nearly 0. So no test relies on v alone.
 //!
-//! *Large blocks*, [`SIGNED_SIDE`] pixels a side or more. Of two pictures of one scene with equal samples,
-//! the signs of the d are independent fair coins whatever the noise. Given their sizes, Σ d / √Σ d² then has tails at
+//! *Large blocks* have [`SIGNED_SIDE`] or more pixels per side. For two pictures of the same scene with equal sample counts,
+//! the signs of the d are independent fair coins for any noise. Given the magnitudes, Σ d / √Σ d² then has tails at
 //! most [`BENTKUS`] times those of the normal distribution [Bentkus2015], for any number of pixels and any
-//! tails of the noise. The denominator is never less than √Σ v, which matters for unequal samples: a dim side
-//! that missed what the other met. Every such block is tested twice, as it is ([`Kind::Mean`]) and with each
-//! pixel divided by the noise of the pixels around it ([`Kind::Standardised`]), which leaves the coins fair, for
-//! that noise contains neither the pixel's value nor its sign. The second sees a change beside a caustic.
+//! tails of the noise. The denominator is at least √Σ v. This matters for unequal sample counts, if the picture with fewer
+//! samples missed rare bright ones. Every such block is tested twice: as it is ([`Kind::Mean`]), and with each
+//! pixel divided by the noise of the pixels around it ([`Kind::Standardised`]). The coins stay fair, since
+//! that noise contains neither the pixel's value nor its sign. The second test detects a change beside a caustic.
 //!
-//! *Small blocks* have too few coins for small probabilities. There two witnesses must agree: Welch's t with a
-//! variance that is the larger of the block's own and the mean around it, its degrees of freedom after
-//! Satterthwaite over both; and Welch's t with the block's own variance alone. The second may be as weak as
-//! the square root of what the first says, because eight replicates cannot say more.
+//! *Small blocks* have too few coins for small probabilities. Two tests must agree there. One is Welch's t with
+//! the larger of the block's own variance and the mean variance around it, with Satterthwaite's degrees of freedom over
+//! both. The other is Welch's t with only the block's own variance. Its p-value may be as large as the square root of the
+//! first one's, since eight replicates can't give smaller ones.
 //!
-//! Every scale and kind has the same share of the false-alarm rate, and within it every block and channel
-//! (Bonferroni). That no sample of a bright path was met in either picture, no test can know.
+//! The false-alarm rate is divided equally among all scales and kinds, and then among blocks and channels
+//! (Bonferroni). No test can detect a bright path that neither picture has sampled.
 
 use super::grid::{Grid, Terms};
 use super::picture::Picture;
@@ -34,7 +34,7 @@ pub const SIGNED_SIDE: u32 = 8;
 /// Tails of a sum of coins of any sizes are at most this much heavier than the normal distribution's: 1/(4 Φc(√2)).
 pub const BENTKUS: f64 = 3.178_5;
 
-/// Means that differ by no more than this share are equal: f32 sums of a block of samples round so.
+/// Means with a smaller relative difference count as equal: f32 sums of a block of samples have this rounding error.
 pub(super) const ROUNDING: f64 = 2e-6;
 
 /// Findings that are kept.
@@ -62,7 +62,7 @@ pub struct Finding {
     pub channel: usize,
     /// Which test found it.
     pub kind: Kind,
-    /// The probability that one of all tests says so of equal pictures.
+    /// The probability that one of all tests finds such a difference in equal pictures.
     pub p: f64,
     /// (B - A) over its standard error, as tested.
     pub z: f64,
@@ -72,12 +72,12 @@ pub struct Finding {
     pub error: f64,
 }
 
-/// The smallest change that the tests would have seen with probability [`POWER`].
+/// The smallest change that the tests detect with probability [`POWER`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensitivity {
     /// Side of the block; 0 for the whole picture.
     pub side: u32,
-    /// Relative change of all light in the block, the median over blocks; infinite where none would do.
+    /// Relative change of the block's brightness, the median over blocks; infinite if no change would be detected.
     pub change: f64,
 }
 
@@ -87,7 +87,7 @@ pub const POWER: f64 = 0.95;
 /// Standard normal quantile of [`POWER`].
 const POWER_QUANTILE: f64 = 1.644_854;
 
-/// What the tests say.
+/// The result of the tests.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
     /// The false-alarm rate over the whole picture.
@@ -98,7 +98,7 @@ pub struct Verdict {
     pub tests: usize,
     /// What differs: the whole picture if it does, then at most eight disjoint blocks, most certain first.
     pub findings: Vec<Finding>,
-    /// What would have been seen, from the whole picture to the smallest blocks.
+    /// The detectable changes, from the whole picture to the smallest blocks.
     pub sensitivity: Vec<Sensitivity>,
 }
 
@@ -213,7 +213,7 @@ pub(super) struct Block {
     pub error: f64,
 }
 
-/// Probability of so much or more if there is no difference (two-sided, not corrected), and the signed statistic.
+/// The p-value (two-sided, not corrected), and the signed statistic.
 fn test(kind: Kind, block: &Block) -> (f64, f64) {
     let d = block.difference;
     if d == 0.0 {
@@ -271,7 +271,7 @@ fn changes(seen: &mut Vec<f64>, grids: &[Grid], needed: f64) {
     }
 }
 
-/// The findings worth telling: what is certain enough, and of overlapping blocks the most certain one.
+/// The findings to report: those that are significant, and among overlapping blocks only the most significant one.
 fn pick(all: Vec<Finding>, alpha: f64) -> Vec<Finding> {
     let certain = all.into_iter().filter(|f| f.p < alpha);
     let (whole, blocks): (Vec<Finding>, Vec<Finding>) = certain.partition(|f| f.whole);

@@ -1,4 +1,4 @@
-//! Which pixels have had which samples: disjoint rectangles, each with its ranges of sample numbers.
+//! Which pixels have which samples: disjoint rectangles, each with its ranges of sample numbers.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -28,7 +28,7 @@ impl Rect {
         }
     }
 
-    /// Pixels a row.
+    /// Pixels per row.
     pub fn width(&self) -> u32 {
         self.x1.saturating_sub(self.x0)
     }
@@ -69,7 +69,7 @@ impl Rect {
         }
     }
 
-    /// Up to four disjoint rectangles that hold what `hole` leaves of this one.
+    /// This rectangle without `hole`, as up to four disjoint rectangles.
     pub fn minus(&self, hole: &Rect) -> Vec<Rect> {
         let Some(h) = self.intersection(hole) else {
             return vec![*self];
@@ -193,7 +193,7 @@ impl Coverage {
         self.total() as f64 / pixels.max(1) as f64
     }
 
-    /// A pixel rectangle and sample numbers that are already there, if any of the given ones is.
+    /// A pixel rectangle and sample numbers that are covered already, if any of the given ones are.
     pub fn overlap(&self, rect: Rect, samples: &Range<u64>) -> Option<(Rect, Range<u64>)> {
         self.cells.iter().find_map(|(r, ranges)| {
             let both = r.intersection(&rect)?;
@@ -224,7 +224,7 @@ impl Coverage {
         starts.min()
     }
 
-    /// What is still missing of `wanted` over `rect`: disjoint rectangles, each with sorted ranges.
+    /// The samples of `wanted` that pixels of `rect` do not have: disjoint rectangles, each with sorted ranges.
     pub fn missing(&self, rect: Rect, wanted: Range<u64>) -> Vec<(Rect, Vec<Range<u64>>)> {
         let mut out = Vec::new();
         let mut rest = vec![rect];

@@ -1,4 +1,4 @@
-//! Whether a picture's stated error can be trusted.
+//! Tests whether a picture's estimated error is reliable.
 
 use super::{Film, REPLICATES, replicate_counts};
 use crate::stats::luminance;
@@ -6,16 +6,16 @@ use crate::stats::tail::{Tail, tail};
 
 impl Film {
     /// The tail of the picture's relative second moments: of each replicate of each pixel the mean square of its samples'
-    /// luminance, over Y² + (0.1 Ȳ)² as in [`Film::relative_error`], Y being the other replicates' mean. The stated error is
-    /// made of means of such numbers: where theirs cannot be trusted, it cannot either.
+    /// luminance, over Y² + (0.1 Ȳ)² as in [`Film::relative_error`], where Y is the mean of the other replicates. The stated
+    /// error is computed from means of such numbers, so it is reliable only if these means are.
     ///
-    /// Y is the others' because a replicate's own would hide its outliers. `None` while some pixel has fewer than two
-    /// replicates, where there are too few pixels to tell, and for a black picture.
+    /// Y excludes the replicate itself, whose own mean would hide its outliers. `None` while some pixel has fewer than two
+    /// replicates, if there are too few pixels, and for a black picture.
     ///
-    /// What it sees: of 60 pictures (four scenes, three seeds, 16 to 4096 samples) the true error was a fifth or more above the
-    /// stated one in 28, all of which it called unsafe, and less than a tenth above in 21, of which it called 4. What it can't
-    /// see: paths so rare that few replicates have met one. While the stated error still falls more slowly than the root of the
-    /// samples it is short by up to a fifth, and may be called safe.
+    /// Measured on 60 pictures (four scenes, three seeds, 16 to 4096 samples): in 28 the true error was at least 20 % above the
+    /// stated one, and the test called all of them unsafe. In 21 it was less than 10 % above, and the test called 4 of them
+    /// unsafe. It can't detect paths so rare that few replicates have one. While the stated error falls more slowly than the
+    /// square root of the samples, it can be too small by up to 20 % and still be called safe.
     pub fn heavy_tail(&self) -> Option<Tail> {
         let floor = (0.1 * self.mean_luminance()).powi(2);
         if !(floor > 0.0 && floor.is_finite()) {

@@ -1,9 +1,9 @@
-//! Samples that were not finite: they are in no sum, so no count may have them either.
+//! Samples that were not finite. They are in no sum, so they must not be counted either.
 
 use super::REPLICATES;
 use std::collections::BTreeMap;
 
-/// How many samples of each replicate a pixel lacks. Sparse, for there should be none.
+/// How many samples of each replicate were left out of a pixel. Sparse, since there should be none.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct LeftOut(BTreeMap<[u32; 2], [u64; REPLICATES]>);
 
@@ -29,7 +29,7 @@ impl LeftOut {
         }
     }
 
-    /// Pixels (x, y) by rows, with what they lack.
+    /// Pixels (x, y) in row order, with the samples left out of them.
     pub fn iter(&self) -> impl Iterator<Item = (u32, u32, [u64; REPLICATES])> {
         self.0.iter().map(|(&[y, x], &n)| (x, y, n))
     }

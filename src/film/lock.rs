@@ -1,29 +1,29 @@
-//! One process at a time goes on with a film.
+//! Only one process at a time may render into a film.
 //!
-//! While a render holds a film, a file beside it is locked. The lock is the system's and ends with the process, however that
-//! ends: what is left of a killed one is a file that nobody holds.
+//! While a process renders into a film, it locks a file beside it. The operating system releases the lock when the process
+//! ends, even if it is killed. The lock file then stays, but is unlocked.
 
 use crate::output::FileError;
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A film held; let go when dropped.
+/// The lock on a film, released when dropped.
 #[derive(Debug)]
 pub struct Lock {
-    /// `None` where there is nothing to be locked.
+    /// `None` if the film can't be locked.
     held: Option<(PathBuf, File)>,
 }
 
 impl Lock {
-    /// Holds the film `path`, there or not, for this process. An error if another has it. Where the file system has no
-    /// locks, and for what is no ordinary file, nothing is held and nothing refused.
+    /// Locks the film `path`, which need not exist, for this process. An error if another process has locked it. Does nothing
+    /// if the file system has no locks, or if `path` is not an ordinary file.
     pub fn new(path: &Path) -> Result<Self, FileError> {
         match fs::metadata(path) {
             Ok(meta) if !meta.is_file() => return Ok(Self { held: None }),
             _ => {}
         }
-        // Through a symbolic link: the film that is meant may be held by its own name.
+        // Follow symbolic links: another process may have locked the film under its own name.
         let film = fs::canonicalize(path).unwrap_or_else(|_| path.into());
         let name = film.file_name().unwrap_or_default().to_string_lossy();
         let end = name.floor_char_boundary(200);
@@ -34,7 +34,7 @@ impl Lock {
                 .create(true)
                 .truncate(false)
                 .open(&beside)
-                .map_err(|e| FileError::io(path, "cannot write a lock beside it", &e))?;
+                .map_err(|e| FileError::io(path, "cannot create the lock file", &e))?;
             match file.try_lock() {
                 Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
@@ -49,7 +49,7 @@ impl Lock {
                     return Ok(Self { held: None });
                 }
             }
-            // Whoever had it before may have removed it between opening and locking.
+            // The previous owner may have removed the file between opening and locking.
             if is_still(&file, &beside).unwrap_or(false) {
                 let held = Some((beside, file));
                 return Ok(Self { held });
@@ -76,7 +76,7 @@ fn is_still(file: &File, path: &Path) -> io::Result<bool> {
 impl Drop for Lock {
     fn drop(&mut self) {
         if let Some((path, _file)) = &self.held {
-            // Still locked: nobody else can take what is removed for theirs.
+            // Remove it while it is still locked, so that no other process can lock the removed file.
             let _ = fs::remove_file(path);
         }
     }
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_film_is_held_once_until_it_is_let_go() {
+    fn a_film_is_locked_by_one_process_until_released() {
         let dir = tempfile::tempdir().unwrap();
         let film = dir.path().join("f.npz");
         let other = dir.path().join("other.npz");

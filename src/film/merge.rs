@@ -1,15 +1,15 @@
-//! Films added up: slices of samples, regions, or both.
+//! Merges films of different samples, different regions, or both.
 
 use super::coverage::{Coverage, Rect};
 use super::{Film, fold};
 use std::fmt;
 use std::ops::Range;
 
-/// Why two films can't be added.
+/// Why two films can't be merged.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum MergeError {
     /// They are of pictures of different sizes.
-    #[error("a film of {}x{} pixels can't be added to one of {}x{}", other[0], other[1], into[0], into[1])]
+    #[error("a film of {}x{} pixels can't be merged with one of {}x{}", other[0], other[1], into[0], into[1])]
     Size {
         /// Size of the film added to.
         into: [u32; 2],
@@ -17,7 +17,7 @@ pub enum MergeError {
         other: [u32; 2],
     },
     /// They divide pixels differently.
-    #[error("a film of {other} strata a side can't be added to one of {into}")]
+    #[error("a film of {other} x {other} strata can't be merged with one of {into} x {into}")]
     Strata {
         /// Strata of the film added to.
         into: u32,
@@ -44,11 +44,11 @@ impl MergeError {
     }
 }
 
-/// Adds `other` to `into`, whose bounds grow to hold both. On an error `into` is as it was.
+/// Adds `other` to `into`, whose bounds grow to hold both. After an error `into` is unchanged.
 ///
 /// Where both have samples, their unfinished blocks are folded into the f64 sums; where only one has,
-/// its unfinished block stays as it is, so that a picture put together from regions goes on
-/// with the same bits. What steered adaptive films is dropped: their sum goes on evenly. That scenes and seeds agree is for the caller to know
+/// its unfinished block stays as it is, so that a picture merged from regions is resumed with the same bits. The pilots of
+/// adaptive films are dropped: the sum is resumed without `--adaptive`. The caller must check that scenes and seeds agree
 /// ([`Provenance::same_samples`](crate::provenance::Provenance::same_samples)).
 pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
     if into.size != other.size {
@@ -85,12 +85,12 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
         }
     }
     into.left_out.merge(&other.left_out);
-    // A sum has no plan that it could go on by.
+    // The pilots of one film say nothing about the sum.
     into.pilot = None;
     Ok(())
 }
 
-/// Adds the sums of `rect`; `fold_blocks` says what becomes of unfinished blocks.
+/// Adds the sums of `rect`. `fold_blocks` decides whether unfinished blocks are added to the f64 sums.
 fn add(into: &mut Film, other: &Film, rect: Rect, fold_blocks: bool) {
     for y in rect.y0..rect.y1 {
         for x in rect.x0..rect.x1 {
@@ -117,8 +117,8 @@ fn add(into: &mut Film, other: &Film, rect: Rect, fold_blocks: bool) {
     }
 }
 
-/// Makes room for `bounds`, which hold the film's. Rows move within their own memory: a film may fill
-/// most of the machine's.
+/// Enlarges the film to `bounds`, which contain its own. Moves rows in place, since a film may fill
+/// most of the memory.
 fn grow(film: &mut Film, bounds: Rect) {
     let old = film.bounds;
     film.bounds = bounds;
@@ -145,7 +145,7 @@ fn move_rows<T: Copy + Default>(pixels: &mut Vec<T>, old: Rect, new: Rect) {
     }
 }
 
-/// Something a merged film lacks.
+/// Samples that are missing from a merged film.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hole {
     /// Where.
@@ -181,7 +181,7 @@ impl fmt::Display for Hole {
     }
 }
 
-/// What is missing for every pixel of the picture to have every sample up to the last that any has.
+/// All gaps: the samples below the highest sample number of the film that some pixels of the picture do not have.
 pub fn holes(film: &Film) -> Vec<Hole> {
     let ends = film.coverage.cells().filter_map(|(_, r)| r.last());
     let end = ends.map(|r| r.end).max().unwrap_or(0);
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn quadrants_become_the_picture_bit_for_bit_and_go_on() {
+    fn merged_quadrants_have_the_bits_of_one_run_and_can_be_resumed() {
         let quadrants = [
             rect(2, 1, 5, 4),
             rect(0, 0, 2, 1),
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn overlaps_and_strangers_are_refused_and_do_no_harm() {
+    fn overlapping_and_foreign_films_are_refused_and_change_nothing() {
         let mut film = rendered(rect(0, 0, 3, 3), 0..10);
         let before = film.clone();
         let refused = |film: &mut Film, other: &Film| merge(film, other).unwrap_err().to_string();
@@ -330,11 +330,11 @@ mod tests {
         );
         assert_eq!(
             refused(&mut film, &Film::new([6, 4], rect(0, 0, 6, 4), 2)),
-            "a film of 6x4 pixels can't be added to one of 5x4"
+            "a film of 6x4 pixels can't be merged with one of 5x4"
         );
         assert_eq!(
             refused(&mut film, &Film::new(SIZE, rect(0, 0, 5, 4), 3)),
-            "a film of 3 strata a side can't be added to one of 2"
+            "a film of 3 x 3 strata can't be merged with one of 2 x 2"
         );
         assert_eq!(film, before);
     }

@@ -1,11 +1,11 @@
-//! The film: what has been measured so far, in f64, with what its error needs.
+//! The film: the sums of all samples so far, in f64, from which mean and error are computed.
 //!
 //! Samples of a pixel are numbered from 0. A *round* is strata² consecutive samples, which visit each
-//! stratum once; round q belongs to *replicate* q mod [`REPLICATES`]. Rounds of one replicate may lean
-//! on each other (stratified, low-discrepancy), replicates never do: they are independent and
-//! identically distributed, so the spread of their means is the error of the whole, whatever the
-//! sampler. A GPU sums in f32 over *blocks* of [`BLOCK`] consecutive samples, a replicate each on its own;
-//! blocks are folded into f64 here. Neither boundary depends on how the work is cut.
+//! stratum once; round q belongs to *replicate* q mod [`REPLICATES`]. Rounds of one replicate may be
+//! correlated (stratified, low-discrepancy), but replicates are independent and
+//! identically distributed, so for every sampler the spread of their means gives the error of the whole.
+//! A GPU sums in f32 over *blocks* of [`BLOCK`] consecutive samples, separately for each replicate;
+//! blocks are added to f64 sums here. Neither boundary depends on how the work is cut.
 
 pub mod coverage;
 mod heavy_tail;
@@ -40,9 +40,9 @@ pub struct Film {
     pub size: [u32; 2],
     /// The part of the picture that `sums` holds.
     pub bounds: Rect,
-    /// Strata a side; fixes which replicate a sample belongs to.
+    /// Strata per side; fixes which replicate a sample belongs to.
     pub strata: u32,
-    /// Which pixels have had which samples.
+    /// Which pixels have which samples.
     pub coverage: Coverage,
     /// Finished blocks; rows of `bounds`, for every pixel its replicates.
     sums: Vec<[Sums<f64>; REPLICATES]>,
@@ -50,18 +50,18 @@ pub struct Film {
     partial: Vec<[Sums<f32>; REPLICATES]>,
     /// Samples that `coverage` has and no sum has.
     left_out: LeftOut,
-    /// What decides where samples go, if that is the picture's noise (`--adaptive`).
+    /// The pilots of an adaptive film (`--adaptive`).
     pub pilot: Option<Pilot>,
 }
 
-/// What a pixel says.
+/// The estimate of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Estimate {
     /// Mean radiance, linear RGB.
     pub mean: [f64; 3],
     /// Standard error of the mean of R, G, B, and of the luminance.
     pub error: [f64; 4],
-    /// Samples it rests on.
+    /// Number of samples.
     pub samples: u64,
     /// Independent replicates behind `error`; 0 or 1: see [`Film::estimate`].
     pub replicates: u32,
@@ -132,9 +132,9 @@ impl Film {
         }
     }
 
-    /// Takes what a GPU has made of `samples`, which lie in one block, over `rect`: the running f32 sums
-    /// of that block for each pixel, row by row. They replace the running sums that the film had, and
-    /// are folded when `samples` ends the block.
+    /// Takes the GPU's result for `samples`, which lie in one block, over `rect`: the running f32 sums
+    /// of that block for each pixel, row by row. They replace the film's running sums, and
+    /// are added to the f64 sums when `samples` ends the block.
     pub fn put_block(
         &mut self,
         rect: Rect,
@@ -172,7 +172,7 @@ impl Film {
                 for ((sums, partial), (x, y)) in pixels.zip(of_row(y)) {
                     let new = running(x, y);
                     if fresh {
-                        // What is there belongs to another block.
+                        // The running sums in the film belong to another block.
                         fold(sums, &take(partial));
                     }
                     if ends {
@@ -207,8 +207,8 @@ impl Film {
         self.coverage.add(rect, samples);
     }
 
-    /// Takes `samples` of each replicate of pixel (x, y), which were given with its sums, for not there: they were not
-    /// finite, and their share of the sums is 0.
+    /// Does not count `samples` of each replicate of pixel (x, y), which were given with its sums. They were not finite, and
+    /// added 0 to the sums.
     pub fn leave_out(&mut self, x: u32, y: u32, samples: [u64; REPLICATES]) {
         debug_assert!(self.bounds.contains(x, y));
         self.left_out.add(x, y, samples);
@@ -229,12 +229,12 @@ impl Film {
         total
     }
 
-    /// What pixel (x, y) says, given how many samples of each replicate [`Film::coverage`] has of it.
+    /// The estimate of pixel (x, y), given how many samples of each replicate [`Film::coverage`] has of it.
     ///
     /// With R >= 2 replicates of n_r samples and mean m_r, the squared standard error of the mean m of all n
     /// samples is Σ n_r (m_r - m)² / ((R - 1) n). With a single replicate the samples' own second moment
-    /// stands in: √(Σ Y²)/n for the luminance, shared among the channels in proportion to their
-    /// means. It is never too small on average (E Y² >= Var Y) and says so by `replicates` = 1.
+    /// is used: √(Σ Y²)/n for the luminance, distributed over the channels in proportion to their
+    /// means. On average it is not too small (E Y² >= Var Y). `replicates` is then 1.
     pub fn estimate(&self, x: u32, y: u32, counts: &[u64; REPLICATES]) -> Estimate {
         estimate(&self.total(x, y), &self.left_out.remaining(x, y, counts))
     }
@@ -276,11 +276,11 @@ impl Film {
         Some((ratio / n as f64).sqrt())
     }
 
-    /// The relative error as a stop condition takes it. [`relative_error`](Self::relative_error) divides a pixel's error by
-    /// its luminance, and where light comes in rare bright samples both rest on the same ones: pixels that had them
-    /// state a large error beside a luminance that is too large, the others a small one. Here each replicate's share of
-    /// s² is divided by the luminance that the *other* replicates have found. That is the same where the error is small,
-    /// and rather too large than too small where it is not. `None` while some pixel has fewer than two replicates.
+    /// The relative error that the stop condition uses. [`relative_error`](Self::relative_error) divides a pixel's error by
+    /// its luminance. If the light comes from rare bright samples, both depend on the same samples: a pixel with such a sample
+    /// has a large error, but also too large a luminance; a pixel without has a small error. Here each replicate's share of
+    /// s² is divided by the luminance of the *other* replicates. For small errors the result is the same; for large ones it is
+    /// too large rather than too small. `None` while some pixel has fewer than two replicates.
     pub fn cautious_error(&self) -> Option<f64> {
         if self.replicates().0 < 2 {
             return None;

@@ -1,8 +1,8 @@
-//! `.npz` archives: what `numpy.load` opens, of arrays that are stored and not compressed.
+//! Reads and writes uncompressed `.npz` archives, as `numpy.load` opens them.
 //!
-//! An archive is a ZIP file of `.npy` members. Here its every byte follows from names, types, shapes
-//! and contents: no clock, no options, ZIP64 records always, so that there is one form for every
-//! size. The reader therefore compares rather than interprets, and no flipped bit gets past it.
+//! An archive is a ZIP file of `.npy` members. Names, types, shapes and contents determine every byte here: there are no
+//! times and no options, and ZIP64 records are always used, so that all sizes have the same form. So the reader
+//! compares instead of interpreting, and detects every flipped bit.
 //!
 //! Sources: PKWARE APPNOTE.TXT 6.3.10, sections 4.3.7 to 4.3.16 and 4.5.3; NumPy NEP 1 (format 1.0).
 
@@ -20,9 +20,9 @@ const PERMISSIONS: u32 = 0o100_644 << 16;
 const DATE: u16 = 1 << 5 | 1;
 /// "See the ZIP64 record".
 const SEE_64: u32 = u32::MAX;
-/// Said of what differs in archives that NumPy or an archiver has written anew, too.
+/// Message for differences that also appear when NumPy or an archiver has rewritten the file.
 const NOT_OURS: &str =
-    "is not as etendue writes it: the film is damaged, or another program has saved it";
+    "was not written by etendue: the film is damaged, or another program has rewritten it";
 /// Bytes of a local header before the name.
 const LOCAL_FIXED: usize = 30;
 
@@ -43,9 +43,9 @@ pub struct Array<'a> {
 pub enum Damage {
     /// Reading failed, or the file ends too early ([`io::ErrorKind::UnexpectedEof`]).
     Io(io::Error),
-    /// It is not what it should be.
+    /// Its content is invalid.
     Wrong(String),
-    /// It is something else altogether.
+    /// It is another kind of file.
     Alien(String),
 }
 
@@ -55,7 +55,7 @@ impl From<io::Error> for Damage {
     }
 }
 
-/// What the directory at the end says of a member.
+/// The directory entry of a member.
 struct Member {
     name: &'static str,
     crc32: u32,
@@ -143,7 +143,7 @@ impl<R: Read> Reader<R> {
         };
         if size != bytes.saturating_add(header) {
             return Err(Damage::Wrong(format!(
-                "array \"{name}\" has {} bytes of numbers, and {} take {bytes}",
+                "array \"{name}\" has {} bytes of numbers, but {} need {bytes}",
                 size.saturating_sub(header),
                 numbers()
             )));
@@ -164,7 +164,7 @@ impl<R: Read> Reader<R> {
         Ok(data)
     }
 
-    /// The end of the archive: nothing but the directory of what was read.
+    /// Checks the end of the archive: only the directory of the members that were read may follow.
     pub fn finish(mut self) -> Result<(), Damage> {
         let expected = directory(&self.members, self.at);
         let mut found = Vec::new();
@@ -177,7 +177,7 @@ impl<R: Read> Reader<R> {
             return Err(Damage::Wrong(format!("its directory {NOT_OURS}")));
         }
         if self.from.read(&mut [0])? != 0 {
-            return Err(Damage::Wrong("it has bytes after its end".into()));
+            return Err(Damage::Wrong("it has extra bytes at the end".into()));
         }
         Ok(())
     }
@@ -200,7 +200,7 @@ impl<R: Read> Reader<R> {
             return Err(match stored == name.as_bytes() {
                 true => Damage::Wrong(format!("the header of its array \"{name}\" {NOT_OURS}")),
                 false if first => Damage::Alien(format!(
-                    "it is an archive, but its first array is not \"{name}\""
+                    "it is a ZIP archive, but its first array is not \"{name}\""
                 )),
                 false => Damage::Wrong(format!("its array \"{name}\" is not where it should be")),
             });
@@ -221,7 +221,7 @@ impl<R: Read> Reader<R> {
             b"PK\x03\x04" => return Ok(()),
             b"\x89PNG" => "it is a PNG picture",
             b"\x76\x2f\x31\x01" => "it is an EXR picture",
-            _ => "it is no NumPy archive (.npz)",
+            _ => "it is not a NumPy archive (.npz)",
         };
         Err(Damage::Alien(what.into()))
     }

@@ -1,40 +1,40 @@
-//! Where an adaptive picture's samples go: pilots, and what follows from them.
+//! Distributes the samples of an adaptive picture over its tiles, based on pilots.
 //!
-//! How many samples a tile of an adaptive picture gets must not depend on those samples. A mean over a number of
-//! samples that rests on their own values is biased: a tile whose first samples are dark by luck looks quiet, gets no
-//! more, and stays dark. The same holds for two halves that steer each other, once they are added up in proportion to
-//! their samples. Here a *pilot*, samples of another seed that are in no sum of the film, says how noisy each tile is,
-//! and nothing else does. Given the pilot, every count is a fixed number, so the mean of every pixel is unbiased and
-//! the spread of its replicates is its error, as without. A long run looks again: pilots double while the
-//! picture grows sixteenfold, and later counts rest on all of them.
+//! The number of samples in a tile must not depend on the values of those samples, or the mean is biased: a tile whose
+//! first samples happen to be dark appears to have little noise, gets no more samples, and stays dark. The same bias appears
+//! if two halves of the samples decide each other's number and are then added in proportion to it. So the noise of each tile
+//! is measured only with a *pilot*: samples with another seed that are in no sum of the film. Given the pilot, every count is
+//! a fixed number. The mean of every pixel is then unbiased, and the spread of its replicates gives its error, as in other
+//! films. Long runs take more pilots: their samples double while the picture's grow sixteenfold, and later counts use all of
+//! them.
 //!
-//! The relative error is √ mean v/n over pixels, v being a pixel's relative variance for one sample. For a given mean
-//! of n it is least where n is proportional to √v, here to that of a tile's mean v. A pilot knows v roughly, and
-//! where light comes in rare bright samples it may have seen none: v is smoothed over neighbours, and [`DEFENCE`] of
-//! all samples go everywhere alike.
+//! The relative error is √ mean v/n over pixels, where v is a pixel's relative variance for one sample. For a given mean
+//! of n it is smallest if n is proportional to √v, here with the mean v of a tile. A pilot measures v only roughly, and may
+//! miss rare bright samples. So v is smoothed over neighbouring tiles, and a fraction [`DEFENCE`] of all samples is
+//! distributed evenly.
 
 use super::Film;
 use super::coverage::Rect;
 use crate::stats::luminance;
 use serde::{Deserialize, Serialize};
 
-/// Pixels a side of a tile, at least; a power of two.
+/// Pixels per side of a tile, at least; a power of two.
 const SIDE: u32 = 16;
 
 /// Tiles of a picture, about, at most: those of large pictures are larger.
 const TILES: u64 = 2048;
 
-/// Share of the samples that is spread evenly.
+/// Fraction of the samples that is distributed evenly.
 const DEFENCE: f64 = 0.25;
 
-/// Pixels a side of the cells whose mean luminance stands for that of their pixels in relative variances. It damps
-/// outliers, too: a bright sample counts in its cell's mean as well.
+/// Pixels per side of a cell. Relative variances are divided by the mean luminance of the cell instead of the pixel. This
+/// also damps outliers, since a bright sample raises its cell's mean too.
 const CELL: u32 = 4;
 
-/// What an adaptive film knows of the noise in its picture.
+/// The noise measured for an adaptive film.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pilot {
-    /// Pixels a side of a tile.
+    /// Pixels per side of a tile.
     side: u32,
     /// The pixels that it is for, disjoint.
     regions: Vec<Rect>,
@@ -45,7 +45,7 @@ pub struct Pilot {
 /// One pilot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Stage {
-    /// Samples a pixel.
+    /// Samples per pixel.
     samples: u64,
     /// Mean relative variance for one sample over the pixels of each square of the grid, row by row.
     variance: Vec<f64>,
@@ -72,7 +72,7 @@ impl Grid {
 }
 
 impl Pilot {
-    /// Nothing known yet of the pixels of `regions`, of which there is one at least.
+    /// For the pixels of `regions` (at least one), with no pilot yet.
     pub fn new(regions: &[Rect]) -> Self {
         let regions = Rect::disjoint(regions);
         let area: u64 = regions.iter().map(Rect::area).sum();
@@ -116,7 +116,7 @@ impl Pilot {
         tiles
     }
 
-    /// An error says what of it, read from a file, cannot be.
+    /// Checks values read from a file. The error names the invalid one.
     pub fn check(&self, bounds: Rect) -> Result<(), String> {
         let inside = |r: &Rect| r.area() > 0 && r.intersection(&bounds) == Some(*r);
         let area: u64 = self.regions.iter().map(Rect::area).sum();
@@ -268,7 +268,7 @@ impl Pilot {
                 high = middle;
             }
         }
-        // What rounding gives to one tile it takes from the next.
+        // Carry the rounding error over to the next tile.
         let mut owed = 0.0;
         let steps = step as f64;
         (0..tiles.len())
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_go_where_the_noise_is_and_their_mean_is_what_was_asked_for() {
+    fn noisy_tiles_get_more_samples_and_the_mean_is_as_requested() {
         let pilot = pilot();
         let tiles = pilot.tiles();
         assert_eq!(tiles.len(), 8);
@@ -405,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_found() {
+    fn invalid_pilots_are_refused() {
         let good = pilot();
         let bounds = Rect::whole([64, 32]);
         assert_eq!(good.check(bounds), Ok(()));

@@ -31,10 +31,10 @@ pub const FORMAT_VERSION: u32 = 1;
 
 const FORMAT: &str = "etendue film";
 
-/// Pixels a side of a picture: the scene format's limit.
+/// Pixels per side of a picture: the scene format's limit.
 const MAX_SIDE: u32 = 65536;
 
-/// What the member `provenance` says. Its first two keys are [`Kind`]'s.
+/// The content of the array `provenance`. Its first two keys are those of [`Kind`].
 #[derive(Serialize, Deserialize)]
 struct Header {
     format: String,
@@ -133,10 +133,10 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
     atomic::replace(path, |file| npz::write(file, &arrays))
 }
 
-/// What a film's file says of it before its numbers.
+/// The part of a film's file before its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outline {
-    /// Whether its samples went where the noise is.
+    /// Whether it was rendered with `--adaptive`.
     pub adaptive: bool,
     /// The part of the picture that it holds.
     pub bounds: Rect,
@@ -146,7 +146,7 @@ pub struct Outline {
     pub provenance: Provenance,
 }
 
-/// Reads what is known without reading the film itself, which may be damaged still.
+/// Reads only the part before the numbers. The numbers are not checked and may be damaged.
 pub fn outline(path: &Path) -> Result<Outline, FileError> {
     let header = reading(path, |mut reader| read_header(&mut reader))?;
     Ok(Outline {
@@ -157,7 +157,7 @@ pub fn outline(path: &Path) -> Result<Outline, FileError> {
     })
 }
 
-/// Loads a film. Whatever is wrong with the file is an error of its content, found before it can do harm.
+/// Loads a film, and checks all its contents.
 pub fn load(path: &Path) -> Result<(Film, Provenance), FileError> {
     reading(path, read)
 }
@@ -179,7 +179,7 @@ fn reading<T>(
             message: format!("cannot read: not enough memory for a film of {length} bytes"),
         },
         Damage::Io(e) => FileError::reading(path, &e),
-        Damage::Wrong(what) => FileError::content(path, format!("no usable film: {what}")),
+        Damage::Wrong(what) => FileError::content(path, format!("invalid film: {what}")),
         Damage::Alien(what) => FileError::content(path, format!("not a film: {what}")),
     })
 }
@@ -187,7 +187,7 @@ fn reading<T>(
 fn read_header<R: Read>(reader: &mut Reader<R>) -> Result<Header, Damage> {
     let wrong = |what: String| Err(Damage::Wrong(what));
     let json = reader.string("provenance")?;
-    let not_json = |e: serde_json::Error| Damage::Wrong(format!("its provenance is wrong: {e}"));
+    let not_json = |e: serde_json::Error| Damage::Wrong(format!("its provenance is invalid: {e}"));
     let kind: Kind = serde_json::from_slice(&json).map_err(not_json)?;
     if kind.format != FORMAT {
         return wrong(format!("its format is {:?}, not {FORMAT:?}", kind.format));
@@ -223,12 +223,12 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     };
     reader.finish()?;
 
-    // Only now is it known that the file is as large as the bounds say.
+    // Only now is it certain that the file is as large as its bounds require.
     let mut counts = counts(&header.coverage, header.bounds).map_err(Damage::Wrong)?;
     subtract(&mut counts, header.bounds, &left_out).map_err(Damage::Wrong)?;
     if let Some(i) = (0..counts.len()).find(|&i| counts[i] != stored[i]) {
         return Err(Damage::Wrong(format!(
-            "pixel {} counts {} samples where its coverage has {}",
+            "pixel {} has a count of {} samples, but its coverage has {}",
             pixel(header.bounds, i),
             stored[i],
             counts[i]
@@ -280,9 +280,7 @@ fn check_pixel(array: &str, sums: &[Sums<f64>; REPLICATES], count: u64) -> Resul
         ));
     }
     if count == 0 && all.any(|&x| x != 0.0) {
-        return Err(format!(
-            "\"{array}\" holds light but no samples are counted"
-        ));
+        return Err(format!("\"{array}\" holds light, but the count is 0"));
     }
     Ok(())
 }
@@ -301,11 +299,13 @@ fn check_header(header: &Header) -> Result<(), String> {
     } = *header;
     if size.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
         let [w, h] = size;
-        return Err(format!("size {w}x{h}: a side has 1 to {MAX_SIDE} pixels"));
+        return Err(format!(
+            "its size is {w}x{h}, but each side must have 1 to {MAX_SIDE} pixels"
+        ));
     }
     if bounds.area() == 0 || bounds.intersection(&Rect::whole(size)) != Some(bounds) {
         return Err(format!(
-            "its part {bounds} does not lie in the picture of {}x{} pixels",
+            "its region {bounds} exceeds the picture of {}x{} pixels",
             size[0], size[1]
         ));
     }
@@ -325,14 +325,14 @@ fn check_header(header: &Header) -> Result<(), String> {
     for (rect, ranges) in coverage.cells() {
         if rect.area() == 0 || rect.intersection(&bounds) != Some(rect) {
             return Err(format!(
-                "its coverage {rect} does not lie in the film's part {bounds} of the picture"
+                "its coverage {rect} exceeds the film's region {bounds}"
             ));
         }
         let ordered = ranges.windows(2).all(|r| r[0].end < r[1].start);
         let empty = ranges.iter().any(|r: &Range<u64>| r.start >= r.end);
         if ranges.is_empty() || empty || !ordered {
             return Err(format!(
-                "its coverage of {rect} has the sample ranges {ranges:?}, which are not ascending and apart"
+                "its coverage of {rect} has the sample ranges {ranges:?}, which are not ascending and disjoint"
             ));
         }
     }
@@ -376,7 +376,7 @@ fn subtract(
         let sum = samples.iter().try_fold(0u64, |sum, &n| sum.checked_add(n));
         let (Some((x, y)), Some(sum)) = (inside, sum) else {
             return Err(format!(
-                "\"left_out\" names pixel ({x}, {y}) out of place, or more samples than there can be"
+                "\"left_out\" lists pixel ({x}, {y}) out of order, or with too many samples"
             ));
         };
         last = Some((y, x));

@@ -37,7 +37,7 @@ fn stated_error_of_four_replicates_is_the_textbook_one() {
 }
 
 #[test]
-fn a_rare_bright_sample_is_not_its_own_excuse() {
+fn a_rare_bright_sample_does_not_hide_its_own_error() {
     let rect = Rect::whole([1, 1]);
     let film = |light: [f64; 4]| {
         let mut film = Film::new([1, 1], rect, 1);
@@ -67,7 +67,7 @@ fn a_rare_bright_sample_is_not_its_own_excuse() {
 }
 
 #[test]
-fn one_replicate_states_its_second_moment() {
+fn with_one_replicate_the_error_is_the_second_moment() {
     let sums = [[1.0, 1.0, 1.0, 1.0], [0.0; 4], [0.0; 4], [0.0; 4]];
     let e = estimate(&sums, &[1, 0, 0, 0]);
     assert_eq!(e.replicates, 1);

@@ -2,6 +2,7 @@
 
 use super::GpuError;
 use crate::engine::DeviceInfo;
+use crate::kernel::trips;
 use std::sync::{Arc, Mutex, OnceLock};
 
 /// Which adapter is wanted.
@@ -75,7 +76,7 @@ fn usable(adapter: &wgpu::Adapter) -> Result<(), String> {
     let storage = adapter.get_texture_format_features(wgpu::TextureFormat::Rgba32Float);
     if limits.max_compute_invocations_per_workgroup < WORKGROUP {
         return Err(format!(
-            "it runs {} invocations a workgroup, {WORKGROUP} are needed",
+            "it allows only {} invocations per workgroup, but {WORKGROUP} are needed",
             limits.max_compute_invocations_per_workgroup
         ));
     }
@@ -129,7 +130,7 @@ impl Gpu {
             let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
             let wanted = choice.name.as_deref().unwrap_or_default();
             GpuError::NoAdapter(format!(
-                "no adapter's name contains {wanted:?}; there are: {}",
+                "no adapter has a name that contains {wanted:?}; the adapters are: {}",
                 names.join(", ")
             ))
         }))
@@ -151,7 +152,7 @@ impl Gpu {
                 keep(&slot, format!("the device was lost: {message}"));
             }
         });
-        let trip_limit = trip_limit(&info);
+        let trip_limit = trips::limit(&info.name, &info.driver);
         Self {
             device,
             queue,
@@ -204,22 +205,5 @@ fn open_device(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), S
         memory_hints: wgpu::MemoryHints::MemoryUsage,
         ..Default::default()
     }))
-    .map_err(|e| format!("it gives no device: {e}"))
-}
-
-/// Older llvmpipe ends every loop of an invocation silently once its loops have made 65535 trips together
-/// (seen with Mesa 22.3, not with 25.0); what has no number is taken for old.
-fn trip_limit(info: &DeviceInfo) -> u64 {
-    let llvmpipe = info.name.to_lowercase().contains("llvmpipe");
-    let mesa = info
-        .driver
-        .split("Mesa ")
-        .nth(1)
-        .and_then(|v| v.split('.').next())
-        .and_then(|v| v.parse::<u32>().ok());
-    if llvmpipe && mesa.is_none_or(|v| v < 25) {
-        65_000
-    } else {
-        u64::from(u32::MAX)
-    }
+    .map_err(|e| format!("can't open a device: {e}"))
 }

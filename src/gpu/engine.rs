@@ -2,14 +2,15 @@
 
 use super::glances::GlanceMarks;
 use super::held::{Held, count_row, goes_on};
-use super::pack::{Params, pack};
+use super::pack::pack;
 use super::tile::{self, Tile};
 use super::work::{Work, coprime_stride, workgroups};
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::coverage::Rect;
 use crate::film::{BLOCK, Film};
-use crate::kernel::{Access, Kernel, compose};
+use crate::kernel::layout::Params;
+use crate::kernel::{Access, Kernel, compose, trips};
 use crate::settings::Settings;
 use crate::world::World;
 use rayon::prelude::*;
@@ -128,16 +129,16 @@ impl GpuEngine {
             problem,
         };
         if kernel.trips_per_sample > gpu.trip_limit {
-            return Err(unable(format!(
-                "one path of this scene may take {} loop trips (max_depth {}), and this driver silently stops an \
-                 invocation at 65535; lower max_depth or use --backend cpu",
-                kernel.trips_per_sample, settings.max_depth
+            return Err(unable(trips::too_many(
+                "one path of this scene may take",
+                kernel.trips_per_sample,
+                &format!(" (max_depth {})", settings.max_depth),
             )));
         }
         tell(Making::Packing);
         let packed = pack(world, kernel.access);
         let device = &gpu.device;
-        if let Some(problem) = scene::too_large(&packed, &device.limits()) {
+        if let Some(problem) = scene::too_large(&packed, world.surface_count(), &device.limits()) {
             return Err(unable(problem));
         }
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
@@ -157,7 +158,7 @@ impl GpuEngine {
                 wgpu::ShaderRuntimeChecks::unchecked(),
             )
         };
-        let scene_layout = scene::layout(device);
+        let scene_layout = scene::layout(device, kernel.access);
         let film_layout = tile::layout(device);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
@@ -184,7 +185,7 @@ impl GpuEngine {
             pollster::block_on(scope.pop()),
         ];
         if let Some(error) = errors.into_iter().flatten().next() {
-            return Err(unable(format!("the kernel was refused: {error}")));
+            return Err(unable(format!("the driver rejected the kernel: {error}")));
         }
         let seen = (kernel.sight > 0).then(|| GlanceMarks::new(world, settings, kernel.sight));
         let mut engine = Self {
@@ -265,7 +266,7 @@ impl GpuEngine {
             // What failed for want of memory is invalid where it is used: the first cause is told.
             if let Some(e) = pollster::block_on(oom.pop()).or(invalid) {
                 return Err(format!(
-                    "no memory for a tile of {} x {} pixels: {e}",
+                    "not enough memory for a tile of {} x {} pixels: {e}",
                     size[0], size[1]
                 ));
             }
@@ -298,13 +299,12 @@ impl GpuEngine {
             }
             if stuck > 0 {
                 let (x, y) = ((stuck - 1) % rect.width(), (stuck - 1) / rect.width());
-                return Err(format!(
-                    "one path of pixel {}, {} takes more than {} loop trips, and this driver silently stops an \
-                     invocation at 65535; lower max_depth or use --backend cpu",
+                let path = format!(
+                    "one path of pixel {}, {} takes more than",
                     rect.x0 + x,
-                    rect.y0 + y,
-                    self.gpu.trip_limit
-                ));
+                    rect.y0 + y
+                );
+                return Err(trips::too_many(&path, self.gpu.trip_limit, ""));
             }
             self.dispatch(rect, most, groups.clone(), from)?;
             from = 1 - from;
@@ -327,13 +327,13 @@ impl GpuEngine {
             tile: [rect.x0, rect.y0],
             size: [rect.width(), rect.height()],
             pixels: number(rect.area()),
-            most: number(most),
+            max_samples: number(most),
             seed: self.seed,
             groups: all,
             first_group: groups.start,
             stride: coprime_stride(all),
             trips: number(self.gpu.trip_limit),
-            rounds: 2,
+            opaque_two: 2,
         };
         self.gpu
             .queue

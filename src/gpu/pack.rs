@@ -1,102 +1,55 @@
-//! Host twins of the kernel's structs, and the scene packed into them.
+//! The scene packed for the device: storage buffers, or records for kernels with trees.
 
-use crate::kernel::lights::{self, LightTree};
-use crate::kernel::records::{self, RECORDS_A_ROW, Records};
-use crate::kernel::{Access, material_tag, shape_tag, trees};
-use crate::scene::Bsdf;
-use crate::world::{Geometry, Node, Tree, World};
-use bytemuck::{Pod, Zeroable};
-use glam::DVec3;
+use crate::kernel::layout::{DiskLight, LightCluster, Material, Surface, single};
+use crate::kernel::records::{RECORDS_A_ROW, Records};
+use crate::kernel::{Access, trees};
+use crate::world::light_tree::{self, LightTree};
+use crate::world::{Node, Tree, World, visibility};
 
-/// `Surface` of surface.wgsl.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, Default)]
-#[repr(C)]
-pub struct Surface {
-    point: [f32; 3],
-    radius: f32,
-    axis: [f32; 3],
-    offset: f32,
-    faces: [u32; 3],
-    material: u32,
-    top: f32,
-    solid: u32,
-    parent: u32,
-    shape: u32,
-}
-
-/// `Material` of surface.wgsl.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, Default)]
-#[repr(C)]
-pub struct Material {
-    color: [f32; 3],
-    kind: u32,
-    specular: [f32; 3],
-    exponent: f32,
-}
-
-/// `DiskLight` of light.wgsl.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, Default)]
-#[repr(C)]
-pub struct DiskLight {
-    center: [f32; 3],
-    radius: f32,
-    normal: [f32; 3],
-    offset: f32,
-    radiance: [f32; 3],
-    face: u32,
-}
-
-/// `LightCluster` of light_tree.wgsl.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, Default)]
-#[repr(C)]
-pub struct LightCluster {
-    center: [f32; 3],
-    radius: f32,
-    power: [f32; 3],
-    cos_cone: f32,
-}
-
-/// `Params` of path.wgsl.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable, Default)]
-#[repr(C)]
-pub struct Params {
-    /// Top left pixel of the tile.
-    pub tile: [u32; 2],
-    /// Width and height of the tile.
-    pub size: [u32; 2],
-    /// Width times height.
-    pub pixels: u32,
-    /// Samples of each pixel that the dispatch may do.
-    pub most: u32,
-    /// Seed of every random number.
-    pub seed: u32,
-    /// Workgroups of the tile.
-    pub groups: u32,
-    /// Number of the first one dispatched.
-    pub first_group: u32,
-    /// Stride through them, coprime to their number.
-    pub stride: u32,
-    /// Loop trips that an invocation may take.
-    pub trips: u32,
-    /// 2, for loops that no compiler unrolls: over words of a pixel, and one that tells whether the driver still lets loops go round.
-    pub rounds: u32,
-}
-
-/// What of a scene lies on the device; never empty, for WGSL has no empty arrays.
+/// What of a scene lies on the device, by how its kernel reaches it.
 #[derive(Debug, Clone)]
-pub struct Packed {
+pub(super) enum Packed {
+    /// Nothing: all is in the kernel's text.
+    Baked,
+    /// Arrays for storage buffers.
+    Buffers(Buffers),
+    /// One row of the texture of records, or whole ones, as fetch/records.wgsl and tree/walk.wgsl say.
+    Records(Vec<[u32; 4]>),
+}
+
+/// Arrays; none is empty, for WGSL has no empty arrays.
+#[derive(Debug, Clone)]
+pub(super) struct Buffers {
     /// Lights first, then the world's primitives.
     pub surfaces: Vec<Surface>,
     /// In the world's order.
     pub materials: Vec<Material>,
     /// In the world's order.
     pub lights: Vec<DiskLight>,
-    /// All that a kernel with trees reads, as records.wgsl and tree.wgsl say: one row of their texture, or whole ones.
-    pub records: Vec<[u32; 4]>,
 }
 
-fn f(v: DVec3) -> [f32; 3] {
-    v.as_vec3().to_array()
+impl Buffers {
+    fn new(world: &World) -> Self {
+        let numbers = 0..world.surface_count();
+        Self {
+            surfaces: numbers.map(|n| Surface::of(world, n)).collect(),
+            materials: world.materials.iter().map(Material::of).collect(),
+            lights: world.lights.iter().map(DiskLight::of).collect(),
+        }
+    }
+
+    fn or_defaults(mut self) -> Self {
+        if self.surfaces.is_empty() {
+            self.surfaces.push(Surface::default());
+        }
+        if self.materials.is_empty() {
+            self.materials.push(Material::default());
+        }
+        if self.lights.is_empty() {
+            self.lights.push(DiskLight::default());
+        }
+        self
+    }
 }
 
 /// Appends the trees of [`Access::Tree`], one after the other, as tree.wgsl says.
@@ -106,7 +59,7 @@ fn pack_trees(
     parted: &trees::Parted,
     surfaces: &[Surface],
 ) {
-    let blocks = trees::blockers(world);
+    let blocks = visibility::blockers(world);
     for group in &parted.groups {
         debug_assert_eq!(records.len(), group.header);
         let tree = Tree::new(&trees::boxes(world, group));
@@ -164,10 +117,10 @@ fn pack_lights(world: &World) -> Vec<[u32; 4]> {
     let clusters: Vec<LightCluster> = tree
         .clusters
         .iter()
-        .map(|c: &lights::Cluster| LightCluster {
-            center: f(c.center),
+        .map(|c| LightCluster {
+            center: single(c.center),
             radius: c.radius as f32,
-            power: f(c.power),
+            power: single(c.power),
             cos_cone: c.cos_cone as f32,
         })
         .collect();
@@ -175,34 +128,38 @@ fn pack_lights(world: &World) -> Vec<[u32; 4]> {
     // See [`Records::clusters`].
     records.resize(2 * records.len(), [0; 4]);
     records.extend(tree.order);
-    records.extend(tree.places.chunks(lights::LIGHTS_A_CLUSTER).map(|four| {
-        let mut record = [0; lights::LIGHTS_A_CLUSTER];
-        record[..four.len()].copy_from_slice(four);
-        record
-    }));
+    records.extend(
+        tree.places
+            .chunks(light_tree::LIGHTS_A_CLUSTER)
+            .map(|four| {
+                let mut record = [0; light_tree::LIGHTS_A_CLUSTER];
+                record[..four.len()].copy_from_slice(four);
+                record
+            }),
+    );
     records
 }
 
 /// Everything for a kernel with trees.
-fn pack_records(
-    world: &World,
-    surfaces: &[Surface],
-    materials: &[Material],
-    lights: &[DiskLight],
-) -> Vec<[u32; 4]> {
+fn pack_records(world: &World) -> Vec<[u32; 4]> {
+    let Buffers {
+        surfaces,
+        materials,
+        lights,
+    } = Buffers::new(world);
     let parted = trees::Parted::new(world);
     let at = Records::new(world, &parted);
     let row = RECORDS_A_ROW as usize;
     let mut records = Vec::with_capacity(at.end.next_multiple_of(row));
-    pack_trees(&mut records, world, &parted, surfaces);
+    pack_trees(&mut records, world, &parted, &surfaces);
     debug_assert_eq!(records.len(), at.surfaces);
-    records.extend_from_slice(bytemuck::cast_slice(surfaces));
+    records.extend_from_slice(bytemuck::cast_slice(&surfaces));
     debug_assert_eq!(records.len(), at.materials);
-    records.extend_from_slice(bytemuck::cast_slice(materials));
+    records.extend_from_slice(bytemuck::cast_slice(&materials));
     debug_assert_eq!(records.len(), at.lights);
-    records.extend_from_slice(bytemuck::cast_slice(lights));
+    records.extend_from_slice(bytemuck::cast_slice(&lights));
     debug_assert_eq!(records.len(), at.clusters);
-    if records::clustered(world) {
+    if light_tree::serves(world.lights.len()) {
         records.extend(pack_lights(world));
     }
     debug_assert_eq!(records.len(), at.end);
@@ -213,181 +170,10 @@ fn pack_records(
 }
 
 /// Packs a world for kernels of this kind.
-pub fn pack(world: &World, access: Access) -> Packed {
-    let mut surfaces = Vec::with_capacity(world.lights.len() + world.primitives.len());
-    for l in &world.lights {
-        surfaces.push(Surface {
-            point: f(l.center),
-            radius: l.radius as f32,
-            axis: f(l.normal),
-            offset: l.offset as f32,
-            faces: [l.face, 0, 0],
-            shape: 1,
-            ..Surface::default()
-        });
-    }
-    for p in &world.primitives {
-        let mut s = Surface {
-            faces: p.faces,
-            material: p.material as u32,
-            solid: p.solid,
-            parent: p.parent,
-            shape: shape_tag(&p.geometry),
-            ..Surface::default()
-        };
-        match p.geometry {
-            Geometry::Disk {
-                center,
-                normal,
-                offset,
-                radius,
-            } => {
-                (s.point, s.radius, s.axis, s.offset) =
-                    (f(center), radius as f32, f(normal), offset as f32);
-            }
-            Geometry::Cylinder {
-                base,
-                axis,
-                offsets,
-                radius,
-            } => {
-                (s.point, s.radius, s.axis) = (f(base), radius as f32, f(axis));
-                (s.offset, s.top) = (offsets[0] as f32, offsets[1] as f32);
-            }
-            Geometry::Plane { normal, offset } => (s.axis, s.offset) = (f(normal), offset as f32),
-            Geometry::Sphere { center, radius } => (s.point, s.radius) = (f(center), radius as f32),
-            Geometry::HugeSphere {
-                pole,
-                normal,
-                radius,
-            } => {
-                (s.point, s.radius, s.axis, s.offset) =
-                    (f(pole), radius as f32, f(normal), (1.0 / radius) as f32);
-            }
-        }
-        surfaces.push(s);
-    }
-    let mut materials: Vec<Material> = world
-        .materials
-        .iter()
-        .map(|bsdf| {
-            let (color, specular, exponent) = match *bsdf {
-                Bsdf::Diffuse { reflectance } | Bsdf::Mirror { reflectance } => {
-                    (reflectance, DVec3::ZERO, 0.0)
-                }
-                Bsdf::Dielectric { ior, transmittance } => (transmittance, DVec3::ZERO, ior),
-                Bsdf::Phong {
-                    diffuse,
-                    specular,
-                    exponent,
-                } => (diffuse, specular, exponent),
-            };
-            Material {
-                color: f(color),
-                kind: material_tag(bsdf),
-                specular: f(specular),
-                exponent: exponent as f32,
-            }
-        })
-        .collect();
-    let mut lights: Vec<DiskLight> = world
-        .lights
-        .iter()
-        .map(|l| DiskLight {
-            center: f(l.center),
-            radius: l.radius as f32,
-            normal: f(l.normal),
-            offset: l.offset as f32,
-            radiance: f(l.radiance),
-            face: l.face,
-        })
-        .collect();
-    let mut records = match access {
-        Access::Tree => pack_records(world, &surfaces, &materials, &lights),
-        Access::Baked | Access::Buffers => Vec::new(),
-    };
-    if records.is_empty() {
-        records.push([0; 4]);
-    }
-    if surfaces.is_empty() {
-        surfaces.push(Surface::default());
-    }
-    if materials.is_empty() {
-        materials.push(Material::default());
-    }
-    if lights.is_empty() {
-        lights.push(DiskLight::default());
-    }
-    Packed {
-        surfaces,
-        materials,
-        lights,
-        records,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::kernel::MODULES;
-    use std::mem::offset_of;
-
-    /// (struct, size, fields with their offsets) of the host.
-    macro_rules! layout {
-        ($($name:ident { $($field:ident),* $(,)? })*) => {
-            vec![$((stringify!($name), size_of::<$name>(), vec![$((stringify!($field), offset_of!($name, $field))),*])),*]
-        };
-    }
-
-    #[test]
-    fn host_structs_lie_as_the_kernel_reads_them() {
-        let host = layout! {
-            Surface { point, radius, axis, offset, faces, material, top, solid, parent, shape }
-            Material { color, kind, specular, exponent }
-            DiskLight { center, radius, normal, offset, radiance, face }
-            LightCluster { center, radius, power, cos_cone }
-            Params { tile, size, pixels, most, seed, groups, first_group, stride, trips, rounds }
-        };
-        // Struct declarations are all that is needed, wherever they stand.
-        let mut text = String::new();
-        for (_, module) in MODULES
-            .iter()
-            .chain(&[("path", include_str!("../../shaders/path.wgsl"))])
-        {
-            for part in module.split("\nstruct ").skip(1) {
-                let body = part.split_once('}').expect("closed").0;
-                if host
-                    .iter()
-                    .any(|(name, ..)| body.starts_with(&format!("{name} {{")))
-                {
-                    text += &format!("struct {body}}}\n");
-                }
-            }
-        }
-        let module = naga::front::wgsl::parse_str(&text).expect("structs parse");
-        let mut layouter = naga::proc::Layouter::default();
-        layouter
-            .update(module.to_ctx())
-            .expect("structs have layouts");
-        for (name, size, fields) in host {
-            let (handle, ty) = module
-                .types
-                .iter()
-                .find(|(_, t)| t.name.as_deref() == Some(name))
-                .unwrap_or_else(|| panic!("no {name}"));
-            let naga::TypeInner::Struct { members, .. } = &ty.inner else {
-                panic!("{name} is a struct")
-            };
-            let shader: Vec<(&str, usize)> = members
-                .iter()
-                .map(|m| (m.name.as_deref().unwrap_or(""), m.offset as usize))
-                .collect();
-            assert_eq!(fields, shader, "{name}");
-            assert_eq!(
-                layouter[handle].to_stride() as usize,
-                size,
-                "stride of {name}"
-            );
-        }
+pub(super) fn pack(world: &World, access: Access) -> Packed {
+    match access {
+        Access::Baked => Packed::Baked,
+        Access::Buffers => Packed::Buffers(Buffers::new(world).or_defaults()),
+        Access::Tree => Packed::Records(pack_records(world)),
     }
 }

@@ -3,7 +3,7 @@
 use super::adapters::WORKGROUP;
 use super::pack::pack;
 use super::{Gpu, scene};
-use crate::kernel::{Access, probe_source};
+use crate::kernel::{Access, ProbeFeatures, probe_source};
 use crate::world::World;
 use wgpu::util::DeviceExt as _;
 
@@ -40,7 +40,7 @@ impl Uniform {
 /// When the module is refused or the device fails.
 pub fn run(
     gpu: &Gpu,
-    features: &[&'static str],
+    features: &ProbeFeatures,
     body: &str,
     inputs: &[Values],
 ) -> Result<Vec<Values>, String> {
@@ -67,7 +67,7 @@ impl Probe {
             label: Some("probe"),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let scene = access.map(|access| (scene::layout(device), access));
+        let scene = access.map(|access| (scene::layout(device, access), access));
         let values = values_layout(device);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("probe"),

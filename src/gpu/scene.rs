@@ -1,15 +1,13 @@
-//! Group 0 of every kernel: the storage buffers of a scene, and the texture of records for kernels with trees.
+//! Group 0 of every kernel: the scene, as far as it is not in the kernel's text.
 
 use super::Gpu;
 use super::pack::Packed;
+use crate::kernel::Access;
 use crate::kernel::records::RECORDS_A_ROW;
 use wgpu::util::DeviceExt as _;
 
-/// The binding of the records.
-const RECORDS: u32 = 3;
-
-/// What is only read: surfaces, materials, lights, records.
-pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+/// What is only read: nothing; surfaces, materials and lights; or records.
+pub(super) fn layout(device: &wgpu::Device, access: Access) -> wgpu::BindGroupLayout {
     let buffer = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Storage { read_only: true },
         has_dynamic_offset: false,
@@ -20,52 +18,68 @@ pub(super) fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         format: wgpu::TextureFormat::Rgba32Uint,
         view_dimension: wgpu::TextureViewDimension::D2,
     };
-    let entry = |binding: u32| wgpu::BindGroupLayoutEntry {
-        binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
-        ty: if binding == RECORDS { texture } else { buffer },
-        count: None,
+    let bound: &[wgpu::BindingType] = match access {
+        Access::Baked => &[],
+        Access::Buffers => &[buffer; 3],
+        Access::Tree => &[texture],
     };
+    let entries: Vec<_> = (0..)
+        .zip(bound)
+        .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty,
+            count: None,
+        })
+        .collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("scene"),
-        entries: &[0, 1, 2, 3].map(entry),
-    })
-}
-
-/// Makes buffers and texture, and binds them.
-pub(super) fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, packed: &Packed) -> wgpu::BindGroup {
-    let buffer = |contents: &[u8]| {
-        gpu.device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("scene"),
-                contents,
-                usage: wgpu::BufferUsages::STORAGE,
-            })
-    };
-    let surfaces = buffer(bytemuck::cast_slice(&packed.surfaces));
-    let materials = buffer(bytemuck::cast_slice(&packed.materials));
-    let lights = buffer(bytemuck::cast_slice(&packed.lights));
-    let records = records(gpu, &packed.records);
-    let resources = [
-        surfaces.as_entire_binding(),
-        materials.as_entire_binding(),
-        lights.as_entire_binding(),
-        wgpu::BindingResource::TextureView(&records),
-    ];
-    let mut binding = 0..;
-    let entries = resources.map(|resource| wgpu::BindGroupEntry {
-        binding: binding.next().expect("endless"),
-        resource,
-    });
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("scene"),
-        layout,
         entries: &entries,
     })
 }
 
+/// Makes buffers or texture, and binds them.
+pub(super) fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, packed: &Packed) -> wgpu::BindGroup {
+    let group = |resources: &[wgpu::BindingResource]| {
+        let numbered = (0..).zip(resources);
+        let entries: Vec<_> = numbered
+            .map(|(binding, resource)| wgpu::BindGroupEntry {
+                binding,
+                resource: resource.clone(),
+            })
+            .collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("scene"),
+            layout,
+            entries: &entries,
+        })
+    };
+    match packed {
+        Packed::Baked => group(&[]),
+        Packed::Buffers(arrays) => {
+            let contents: [&[u8]; 3] = [
+                bytemuck::cast_slice(&arrays.surfaces),
+                bytemuck::cast_slice(&arrays.materials),
+                bytemuck::cast_slice(&arrays.lights),
+            ];
+            let buffers = contents.map(|contents| {
+                gpu.device
+                    .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                        label: Some("scene"),
+                        contents,
+                        usage: wgpu::BufferUsages::STORAGE,
+                    })
+            });
+            group(&buffers.each_ref().map(|b| b.as_entire_binding()))
+        }
+        Packed::Records(records) => {
+            group(&[wgpu::BindingResource::TextureView(&texture(gpu, records))])
+        }
+    }
+}
+
 /// A texture of one row, or of whole ones.
-fn records(gpu: &Gpu, records: &[[u32; 4]]) -> wgpu::TextureView {
+fn texture(gpu: &Gpu, records: &[[u32; 4]]) -> wgpu::TextureView {
     let width = (records.len() as u32).min(RECORDS_A_ROW);
     let descriptor = wgpu::TextureDescriptor {
         label: Some("records"),
@@ -89,34 +103,27 @@ fn records(gpu: &Gpu, records: &[[u32; 4]]) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// What is too large for a device, with the numbers.
-pub(super) fn too_large(packed: &Packed, limits: &wgpu::Limits) -> Option<String> {
-    let bound = limits.max_storage_buffer_binding_size;
-    let sizes = [
-        (
-            "surfaces",
-            packed.surfaces.len(),
-            size_of_val(&packed.surfaces[..]),
-        ),
-        (
-            "materials",
-            packed.materials.len(),
-            size_of_val(&packed.materials[..]),
-        ),
-    ];
-    for (what, count, bytes) in sizes {
-        if bytes as u64 > bound {
-            return Some(format!(
-                "{count} {what} need a storage buffer of {bytes} bytes, it binds {bound} at most"
-            ));
+/// What is too large for a device, with the numbers; of a world with so many `surfaces`.
+pub(super) fn too_large(packed: &Packed, surfaces: usize, limits: &wgpu::Limits) -> Option<String> {
+    match packed {
+        Packed::Baked => None,
+        Packed::Buffers(arrays) => {
+            let bound = limits.max_storage_buffer_binding_size;
+            let bytes = size_of_val(&arrays.surfaces[..]).max(size_of_val(&arrays.materials[..]));
+            (bytes as u64 > bound).then(|| {
+                format!(
+                    "{surfaces} surfaces need a storage buffer of {bytes} bytes, but it allows at most {bound}"
+                )
+            })
+        }
+        Packed::Records(records) => {
+            let rows = records.len().div_ceil(RECORDS_A_ROW as usize);
+            let most = limits.max_texture_dimension_2d;
+            (rows > most as usize).then(|| {
+                format!(
+                    "{surfaces} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, but it allows at most {most}"
+                )
+            })
         }
     }
-    let rows = packed.records.len().div_ceil(RECORDS_A_ROW as usize);
-    let most = limits.max_texture_dimension_2d;
-    (rows > most as usize).then(|| {
-        format!(
-            "{} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, it has {most} at most",
-            packed.surfaces.len()
-        )
-    })
 }

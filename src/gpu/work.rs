@@ -2,10 +2,8 @@
 
 use crate::engine::Part;
 use crate::film::coverage::Rect;
+use crate::kernel::GROUP_SIDE;
 use std::ops::Range;
-
-/// Pixels along an edge of the block that a workgroup is: what `shaders/path.wgsl` says.
-const BLOCK_SIDE: u32 = 8;
 
 /// The samples that each pixel of a tile is to have.
 pub(super) struct Work {
@@ -47,7 +45,7 @@ impl Work {
     pub fn paths(&self, done: u64, most: u64) -> Vec<u64> {
         let of = |r: &Range<u32>| u64::from(r.end - r.start).saturating_sub(done).min(most);
         let width = self.tile.width() as usize;
-        let side = BLOCK_SIDE as usize;
+        let side = GROUP_SIDE as usize;
         let mut groups: Vec<u64> = Vec::with_capacity(workgroups(self.tile) as usize);
         for rows in self.pixels.chunks(side * width) {
             let first = groups.len();
@@ -66,7 +64,7 @@ impl Work {
 
 /// Workgroups that cover `rect`.
 pub(super) fn workgroups(rect: Rect) -> u32 {
-    rect.width().div_ceil(BLOCK_SIDE) * rect.height().div_ceil(BLOCK_SIDE)
+    rect.width().div_ceil(GROUP_SIDE) * rect.height().div_ceil(GROUP_SIDE)
 }
 
 /// About 0.618 of `groups`, and without a common divisor with it: steps of this visit every group once.

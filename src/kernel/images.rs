@@ -1,11 +1,13 @@
 //! Which lights are sought in which mirror balls, and generated WGSL that chooses among them: see shaders/image.wgsl.
 
-use super::lights::LIGHT_COLORS;
+use super::access::Access;
+use super::emit::fetch::{Scalars, chain};
+use super::features::last_depth;
+use super::layout::DiskLight;
 use super::literal::{float, vector};
-use super::tables::{self, Fields};
-use super::{Access, last_depth};
 use crate::scene::Bsdf;
 use crate::settings::{Integrator, Settings};
+use crate::world::light_tree::LIGHT_COLORS;
 use crate::world::{Geometry, Side, World, WorldLight, WorldPrimitive};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -15,8 +17,8 @@ use std::ops::RangeInclusive;
 /// The most images among which a path chooses, for each has its weight at every diffuse vertex; the rest is left to chance.
 const MOST: usize = 8;
 
-/// Bits in which a path remembers the number of a surface, and those of a light: `MIRROR_BITS` of the shader.
-const MIRROR_BITS: u32 = 15;
+/// Bits in which a path remembers the number of a surface, and those of a light.
+pub(super) const MIRROR_BITS: u32 = 15;
 
 /// How far lengths may differ for their fourth powers to stay in f32.
 const LIKE_LENGTHS: RangeInclusive<f64> = 1e-4..=1e4;
@@ -127,7 +129,8 @@ pub(super) fn generate(world: &World, images: &[Image]) -> String {
     let mut s = format!(
         "
 // Whether a path that remembers this counts the light with this number when it meets it.
-fn counts_light(memory: u32, light: u32) -> bool {{
+fn counts_light(trail: ImageTrail, light: u32) -> bool {{
+    let memory = trail.memory;
     let by = memory & MIRROR_MASK;
     let image = {};
     let right = memory >= SENT_AND_MET && ((memory >> MIRROR_BITS) & MIRROR_MASK) == light;
@@ -139,15 +142,16 @@ fn counts_light(memory: u32, light: u32) -> bool {{
     );
     s.push_str(&choice(images));
 
-    let each = |fields: &dyn Fn(&Image) -> Fields| -> Vec<(u32, Fields)> {
+    let each = |fields: &dyn Fn(&Image) -> Scalars| -> Vec<(u32, Scalars)> {
         (0..).zip(images.iter().map(fields)).collect()
     };
     let balls = each(&|i| {
         let [x, y, z] = i.center.to_array().map(float);
         let names = ["center.x", "center.y", "center.z", "radius"];
-        names.into_iter().zip([x, y, z, float(i.radius)]).collect()
+        let names = names.map(str::to_owned).into_iter();
+        names.zip([x, y, z, float(i.radius)]).collect()
     });
-    let lights = each(&|i| tables::light_fields(&world.lights[i.light]));
+    let lights = each(&|i| DiskLight::of(&world.lights[i.light]).scalars());
     for (name, kind, elements) in [
         ("fn image_ball(index: u32) -> Sphere", "Sphere", balls),
         (
@@ -156,7 +160,7 @@ fn counts_light(memory: u32, light: u32) -> bool {{
             lights,
         ),
     ] {
-        s.push_str(&tables::chain(name, kind, "index", &elements));
+        s.push_str(&chain(name, kind, "index", &elements));
         s.push('\n');
     }
     s.push_str("fn image_memory(index: u32) -> u32 {\n    var numbers = 0u;\n");

@@ -1,8 +1,8 @@
 //! Where everything lies in the texture of records that kernels of large scenes read.
 
-use super::lights::{LIGHTS_A_CLUSTER, MOST_LOOKED_AT, ends};
 use super::trees::Parted;
 use crate::world::World;
+use crate::world::light_tree::{LIGHTS_A_CLUSTER, ends, serves};
 use std::fmt::Write as _;
 
 /// Records, of four words each, in a row of the texture.
@@ -32,7 +32,11 @@ impl Records {
     /// By the numbers of things alone.
     pub fn new(world: &World, parted: &Parted) -> Self {
         let lights = world.lights.len();
-        let ends = if clustered(world) { ends(lights) } else { 0 };
+        let ends = if serves(world.lights.len()) {
+            ends(lights)
+        } else {
+            0
+        };
         let surfaces_at = parted.end();
         let materials_at = surfaces_at + 4 * (lights + world.primitives.len());
         let lights_at = materials_at + 2 * world.materials.len();
@@ -65,16 +69,11 @@ impl Records {
         constant("SURFACE", self.surfaces);
         constant("MATERIAL", self.materials);
         constant("LIGHT", self.lights);
-        if clustered(world) {
+        if serves(world.lights.len()) {
             constant("CLUSTER", self.clusters);
             constant("FOUR", self.fours);
             constant("PLACE", self.places);
         }
         s
     }
-}
-
-/// Whether lights are too many to look at each for every choice.
-pub(crate) fn clustered(world: &World) -> bool {
-    world.lights.len() > MOST_LOOKED_AT
 }

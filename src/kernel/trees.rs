@@ -3,10 +3,11 @@
 //! Every kind of surface, as one function of the shaders meets it, has a tree of its own, so that a walk contains just
 //! that function. What has no bounds, and kinds with few members, are met one by one, as in small scenes.
 
-use super::rays::{
-    Surface, buffer_call, can_block, hull_faces, primitive, shadow_function, surfaces,
-};
-use super::select::BAKED_LIMIT;
+use super::access::BAKED_LIMIT;
+use super::emit::surfaces::{Function, Target, Variant, for_shadows, targets};
+use super::layout::ShapeKind;
+use super::modules::{Module, WALK_BOXES, WALK_DISKS, WALK_SPHERES};
+use super::preprocess::fill;
 use crate::world::{Bounds, Tree, World};
 use std::fmt::Write as _;
 
@@ -15,13 +16,10 @@ use std::fmt::Write as _;
 /// cylinders, and what is met one by one is compiled for longer.
 const LEAST_IN_TREE: [usize; 4] = [48, 24, 12, 1];
 
-/// Nodes that a trip of a walk's loop visits: the trips that older drivers grant go farther, and it costs nothing.
-const VISITS_A_TRIP: usize = 2;
-
 /// Surfaces that one function meets, and where their tree lies.
 pub(crate) struct Group {
     /// The function.
-    pub function: &'static str,
+    pub function: Function,
     /// Their numbers, lights first.
     pub numbers: Vec<usize>,
     /// Number of the record, a multiple of four, four before those of their tree's nodes.
@@ -46,17 +44,17 @@ impl Group {
 
     /// Whether nodes hold the surfaces themselves.
     pub fn spheres(&self) -> bool {
-        self.function.starts_with("sphere")
+        self.function.shape == ShapeKind::Sphere
     }
 
     /// Whether they are disks, whose leaves hold them.
     pub fn disks(&self) -> bool {
-        self.function == "disk_hit"
+        self.function.shape == ShapeKind::Disk
     }
 
     /// Whether they are spheres that bound solids.
     pub fn solids(&self) -> bool {
-        self.function == "sphere_boundary"
+        self.spheres() && self.function.variant == Variant::Boundary
     }
 }
 
@@ -65,16 +63,16 @@ pub(crate) struct Parted {
     /// Those in trees.
     pub groups: Vec<Group>,
     /// Those that are met one by one.
-    pub(super) apart: Vec<Surface>,
+    pub(super) apart: Vec<Target>,
 }
 
 impl Parted {
     /// By kinds and their numbers alone. In a small scene, where nobody would want trees, all go into trees that can: so
     /// tests reach every part.
     pub fn new(world: &World) -> Self {
-        let all = surfaces(world);
-        let bounded = |s: &Surface| s.light || primitive(world, s).geometry.bounds().is_some();
-        let mut kinds: Vec<(&'static str, usize)> = Vec::new();
+        let all = targets(world);
+        let bounded = |t: &Target| bounds(world, t.number).is_some();
+        let mut kinds: Vec<(Function, usize)> = Vec::new();
         for s in all.iter().filter(|s| bounded(s)) {
             match kinds.iter_mut().find(|k| k.0 == s.function) {
                 Some(kind) => kind.1 += 1,
@@ -106,7 +104,7 @@ impl Parted {
             header = group.end();
             groups.push(group);
         }
-        let in_tree = |s: &Surface| groups.iter().any(|g| g.function == s.function);
+        let in_tree = |s: &Target| groups.iter().any(|g| g.function == s.function);
         let apart = all.into_iter().filter(|s| !in_tree(s)).collect();
         Self { groups, apart }
     }
@@ -117,26 +115,21 @@ impl Parted {
     }
 }
 
-/// The boxes of a group's surfaces.
-pub(crate) fn boxes(world: &World, group: &Group) -> Vec<Bounds> {
-    let first = world.lights.len();
-    let bounds = |&number: &usize| match world.lights.get(number) {
-        Some(l) => Bounds::disk(l.center, l.normal, l.radius),
-        None => world.primitives[number - first]
-            .geometry
-            .bounds()
-            .expect("groups are of bounded things"),
-    };
-    group.numbers.iter().map(bounds).collect()
+/// The box around surface number `number`, if it has bounds.
+fn bounds(world: &World, number: usize) -> Option<Bounds> {
+    match world.primitive(number) {
+        Some(p) => p.geometry.bounds(),
+        None => {
+            let l = &world.lights[number];
+            Some(Bounds::disk(l.center, l.normal, l.radius))
+        }
+    }
 }
 
-/// By number, whether a surface can lie between a point that a path reaches and a light.
-pub(crate) fn blockers(world: &World) -> Vec<bool> {
-    let hull = hull_faces(world);
-    surfaces(world)
-        .iter()
-        .map(|s| can_block(world, s, &hull))
-        .collect()
+/// The boxes of a group's surfaces.
+pub(crate) fn boxes(world: &World, group: &Group) -> Vec<Bounds> {
+    let of = |&number: &usize| bounds(world, number).expect("groups are of bounded things");
+    group.numbers.iter().map(of).collect()
 }
 
 /// `hit = nearest_K(ray, hit)` and the like for every tree, in the functions that meet everything.
@@ -150,170 +143,73 @@ pub(super) fn calls(s: &mut String, parted: &Parted, walk: &str) {
 pub(super) fn walks(world: &World, parted: &Parted, shadows: bool) -> String {
     let mut s = String::new();
     for (k, group) in parted.groups.iter().enumerate() {
-        s.push_str(&nearest(k, group));
+        s.push_str(&walk(&format!("nearest_{k}"), group, group.function, false));
         if shadows {
-            s.push_str(&any(world, k, group));
+            let function = shadow_function(world, group);
+            s.push_str(&walk(&format!("any_{k}"), group, function, true));
         }
     }
     s
 }
 
-/// The loop of a walk, which goes on while `going_on`: `leaf` for what to do at surface `i`, whose code is `item`; of spheres
-/// `low` and `radius` are the centre and radius.
-fn walk(group: &Group, going_on: &str, leaf: impl Fn(&str) -> String) -> String {
-    let header = group.header;
-    let mut s = format!(
-        "    var hit = first;
-    let slabs = slabs_of(ray, bitcast<f32>(record({header}u).x));
-    var at = Place(1u, 0u);
-    while at.node != 0u && {going_on}trips_left > 0u {{
-        trips_left -= 1u;
-"
-    );
-    let mut visit = format!(
-        "
-            let place = four_records({}u + at.node);
-            let a = textureLoad(records, place);
-            let b = textureLoad(records, place + vec2u(1u, 0u));
-            let c = textureLoad(records, place + vec2u(2u, 0u));
-            let low_0 = bitcast<vec3f>(a.xyz);
-            let high_0 = bitcast<vec3f>(vec3u(a.w, b.xy));
-            let low_1 = bitcast<vec3f>(vec3u(b.zw, c.x));
-            let high_1 = bitcast<vec3f>(c.yzw);
-",
-        header / 4 + 1
-    );
-    if group.spheres() {
-        // A sphere costs no more than a box, and needs no visit of its own.
-        if group.solids() {
-            visit.push_str(
-                "            let solids = textureLoad(records, place + vec2u(3u, 0u));\n",
-            );
-        }
-        for (child, last) in [(0, "b.y"), (1, "c.w")] {
-            let solid = ["solids.x, solids.y", "solids.z, solids.w"][child];
-            let (radius, item) = [("a.w", "b.x"), ("c.y", "c.z")][child];
-            let _ = write!(
-                visit,
-                "            let leaf_{child} = {last} == LEAF;
-            if leaf_{child} {{
-                let item = {item};
-                let i = (item >> 1u) - 1u;
-                let sphere = Sphere(low_{child}, bitcast<f32>({radius}));
-{}
-            }}
-",
-                leaf(solid)
-            );
-        }
-        for _ in 0..VISITS_A_TRIP {
-            let _ = writeln!(
-                s,
-                "        {{{visit}            let entry_0 = select(box_entry(slabs, low_0, high_0, hit.t), MISSED, leaf_0);
-            let entry_1 = select(box_entry(slabs, low_1, high_1, hit.t), MISSED, leaf_1);
-            at = onward(at, entry_0, entry_1);
-        }}"
-            );
-        }
-    } else if group.disks() {
-        for _ in 0..VISITS_A_TRIP {
-            let _ = writeln!(
-                s,
-                "        {{{visit}            let leaf = c.w == LEAF;
-            if leaf {{
-                let item = c.x;
-                let i = (item >> 1u) - 1u;
-                let disk = Disk(low_0, bitcast<f32>(a.w), bitcast<vec3f>(b.xyz), bitcast<f32>(b.w));
-{}
-            }}
-            let entry_0 = select(box_entry(slabs, low_0, high_0, hit.t), MISSED, leaf);
-            let entry_1 = select(box_entry(slabs, low_1, high_1, hit.t), MISSED, leaf);
-            at = onward(at, entry_0, entry_1);
-        }}",
-                leaf("")
-            );
-        }
-    } else {
-        // On to the next leaf whose box is met; a masked-off branch would cost its time at every visit.
-        let _ = writeln!(
-            s,
-            "        var item = 0u;
-        while at.node != 0u && item == 0u && trips_left > 0u {{
-            trips_left -= 1u;{visit}            let leaf = c.w == LEAF;
-            item = select(0u, a.x, leaf);
-            let entry_0 = select(box_entry(slabs, low_0, high_0, hit.t), MISSED, leaf);
-            let entry_1 = select(box_entry(slabs, low_1, high_1, hit.t), MISSED, leaf);
-            at = onward(at, entry_0, entry_1);
-        }}
-        if item != 0u {{
-            let i = (item >> 1u) - 1u;
-            let s = surface_at(i << 2u);
-{}
-        }}",
-            leaf("")
-        );
-    }
-    s + "    }\n    return hit;\n}\n\n"
-}
-
-/// A call of `function` for the surface at a leaf.
-fn call(group: &Group, function: &str, hit: &str, solid: &str) -> String {
-    if group.spheres() {
-        let solid = if group.solids() {
-            format!(", {solid}")
-        } else {
-            String::new()
-        };
-        format!("{function}({hit}, ray, sphere, 4u * i + 1u, 4u * i{solid})")
-    } else if group.disks() {
-        format!("{function}({hit}, ray, disk, c.y, 4u * i)")
-    } else {
-        buffer_call(function).replacen("(hit,", &format!("({hit},"), 1)
-    }
-}
-
-fn nearest(k: usize, group: &Group) -> String {
-    // Trees are walked in any order: among equals the lower key is the earlier.
-    let leaf = |solid: &str| {
-        format!(
-            "                let found = {};
-                let take = found.t < hit.t || (found.t == hit.t && found.key < hit.key);
-                hit = Hit(select(hit.t, found.t, take), select(hit.key, found.key, take));",
-            call(group, group.function, "Hit(FAR, NONE)", solid)
-        )
-    };
-    format!(
-        "fn nearest_{k}(ray: Ray, first: Hit) -> Hit {{\n{}",
-        walk(group, "", leaf)
-    )
-}
-
-fn any(world: &World, k: usize, group: &Group) -> String {
-    let surface = |&number: &usize| Surface {
+/// The function for shadow rays. Where some of a group hold lights and others do not, what is right for those is right for all.
+fn shadow_function(world: &World, group: &Group) -> Function {
+    let target = |&number: &usize| Target {
         number,
-        light: number < world.lights.len(),
         function: group.function,
     };
-    // Where some of a kind hold lights and others do not, what is right for those is right for all.
-    let mut functions = group.numbers.iter().map(surface).map(|s| match s.light {
-        true => s.function,
-        false => shadow_function(world, &s),
-    });
+    let mut functions = group.numbers.iter().map(|n| for_shadows(world, &target(n)));
     let first = functions.next().unwrap_or(group.function);
-    let function = if functions.all(|f| f == first) {
+    if functions.all(|f| f == first) {
         first
     } else {
         group.function
+    }
+}
+
+/// One walk, which asks `function` at the leaves: for the nearest hit, or until `any` is found.
+fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
+    let template: Module = match group.function.shape {
+        ShapeKind::Sphere => WALK_SPHERES,
+        ShapeKind::Disk => WALK_DISKS,
+        _ => WALK_BOXES,
     };
-    let leaf = |solid: &str| {
-        format!(
-            "                let found = {};
-                hit.key = select(hit.key, found.key, (item & 1u) == 1u);",
-            call(group, function, "hit", solid)
-        )
+    let boxes = !group.spheres() && !group.disks();
+    let hit = match (any, boxes) {
+        (false, _) => "Hit(FAR, NONE)",
+        (true, false) => "*hit",
+        (true, true) => "hit",
     };
-    format!(
-        "fn any_{k}(ray: Ray, first: Hit) -> Hit {{\n{}",
-        walk(group, "hit.key == NONE && ", leaf)
-    )
+    // What a leaf of spheres or disks does not hold is known, or in the record beside it.
+    let leaf = |field: &str, child: usize| match (field, group.disks()) {
+        ("faces.x", true) => "c.y".to_owned(),
+        ("faces.x", false) => "4u * i + 1u".to_owned(),
+        ("solid", _) => format!("solids.{}", ["x", "z"][child]),
+        ("parent", _) => format!("solids.{}", ["y", "w"][child]),
+        _ => unreachable!("leaves have no {field}"),
+    };
+    let sphere = |child: usize| function.call_with(hit, "sphere", |f| leaf(f, child), "4u * i");
+    let call = match (group.spheres(), group.disks()) {
+        (true, _) => String::new(),
+        (_, true) => function.call_with(hit, "disk", |f| leaf(f, 0), "4u * i"),
+        _ => function.call(hit, |f| format!("s.{f}"), "i * 4u"),
+    };
+    let calls = if group.spheres() {
+        [0, 1].map(sphere)
+    } else {
+        Default::default()
+    };
+    fill(
+        template.text,
+        &[
+            ("walk", name),
+            ("header", &format!("{}u", group.header)),
+            ("nodes", &format!("{}u", group.header / 4 + 1)),
+            ("goes_on", if any { "hit.key == NONE &&" } else { "" }),
+            ("keep", if any { "keep_blocker" } else { "keep_nearest" }),
+            ("call_0", &calls[0]),
+            ("call_1", &calls[1]),
+            ("call", &call),
+        ],
+    ) + "\n"
 }

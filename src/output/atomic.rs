@@ -1,7 +1,7 @@
-//! Files appear whole or not at all: written beside their name, synced, renamed.
+//! Writes files atomically: to a temporary file beside the target, which is synced and renamed.
 //!
-//! A process that is killed leaves its temporary file behind. It holds a lock on it while it lives,
-//! so the next one to write the same name can tell such leftovers from work in progress and removes them.
+//! A killed process leaves its temporary file behind. A running process holds a lock on its file,
+//! so the next process that writes the same name can recognise leftovers, and removes them.
 
 use super::error::FileError;
 use std::fs::{self, File, TryLockError};
@@ -15,9 +15,8 @@ const SUFFIX: &str = ".partial";
 /// Replaces `path` by what `write` writes. On any error the file that was there is untouched and
 /// nothing else is left in its folder.
 ///
-/// A symbolic link is followed. Something that is no ordinary file (`/dev/null`, a pipe) is written
-/// into, when all that is to be written is known, not replaced. Permissions are those of an
-/// ordinary new file.
+/// Follows symbolic links. If the target is not an ordinary file (`/dev/null`, a pipe), writes the complete data into it
+/// instead of replacing it. Permissions are those of an ordinary new file.
 pub fn replace<F>(path: &Path, write: F) -> Result<(), FileError>
 where
     F: FnOnce(&mut BufWriter<File>) -> io::Result<()>,
@@ -25,7 +24,7 @@ where
     replace_with(path, write).map_err(|e| FileError::io(path, "cannot write", &e))
 }
 
-/// Whether `path` could be replaced now: to be asked before hours of rendering.
+/// Checks that `path` can be replaced. Call it before hours of rendering.
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     let attempt = || match target(path)? {
         Target::File(file) => temporary(&file).map(drop),
@@ -49,10 +48,10 @@ fn target(path: &Path) -> io::Result<Target> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
             let folder = folder_of(path);
             if path.file_name().is_none() || path.as_os_str().as_encoded_bytes().ends_with(b"/") {
-                return Err(io::Error::other("it names a folder, not a file"));
+                return Err(io::Error::other("the path names a folder, not a file"));
             }
             if !folder.exists() {
-                let text = format!("there is no folder \"{}\"", folder.display());
+                let text = format!("no such folder \"{}\"", folder.display());
                 return Err(io::Error::other(text));
             }
             Ok(Target::File(path.into()))
@@ -91,8 +90,8 @@ where
             let temporary = temporary(&path)?;
             fill(temporary.as_file().try_clone()?)?.sync_all()?;
             temporary.persist(&path).map_err(|e| e.error)?;
-            // Makes the new name last through a power cut. Some file systems refuse; the file is whole
-            // either way, so that is no failure.
+            // Makes the new name survive a power failure. Some file systems refuse. The file is complete either way, so
+            // this is not an error.
             let _ = File::open(folder_of(&path)).and_then(|folder| folder.sync_all());
             Ok(())
         }
@@ -139,7 +138,7 @@ fn remove_leftovers(path: &Path) {
         let name = entry.file_name();
         let name = name.to_string_lossy();
         let ours = name.starts_with(&prefix) && name.ends_with(SUFFIX);
-        // A name of its own may begin as ours does: between prefix and suffix stand six letters.
+        // Other files may have the same prefix: our names have exactly six letters between prefix and suffix.
         if !ours || name.len() != prefix.len() + 6 + SUFFIX.len() {
             continue;
         }
@@ -200,7 +199,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::write(dir.path().join("file"), "").unwrap();
         for (path, expected) in [
-            ("none/a.txt", "there is no folder"),
+            ("none/a.txt", "no such folder"),
             ("", "is a directory"),
             ("file/a.txt", "not a directory"),
         ] {
@@ -223,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn leftovers_of_the_dead_are_removed_and_work_in_progress_is_not() {
+    fn leftovers_of_killed_processes_are_removed_and_files_in_use_stay() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.npz");
         let dead = temporary(&path).unwrap();

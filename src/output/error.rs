@@ -1,9 +1,9 @@
-//! What can go wrong with a file, in the two kinds that the command line tells apart.
+//! File errors, in the two kinds that have different exit statuses.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// A file that can't be had (exit status 4), or whose content is wrong (exit status 2).
+/// A file that can't be read or written (exit status 4), or whose content is invalid (exit status 2).
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// Missing, a directory, not readable or writable, disk full.
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decoder_s_complaint_is_content_and_the_system_s_is_not() {
+    fn decoder_errors_are_content_and_system_errors_are_not() {
         let path = Path::new("x");
         let decoder = io::Error::new(io::ErrorKind::InvalidData, "bad block");
         assert!(FileError::reading(path, &decoder).is_content());

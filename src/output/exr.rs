@@ -76,7 +76,7 @@ fn float(x: f64) -> f32 {
 }
 
 fn attributes(provenance: &Provenance) -> LayerAttributes {
-    // exr's own conversion from str takes Latin-1 alone; OpenEXR says UTF-8.
+    // The exr crate's conversion from str accepts only Latin-1, but OpenEXR uses UTF-8.
     let text = |s: &str| Text::from_slice_unchecked(s.as_bytes());
     let mut attributes = LayerAttributes::default();
     for (key, value) in entries(provenance) {
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_overflows_a_float_is_the_largest() {
+    fn values_too_large_for_f32_become_the_largest_f32() {
         assert_eq!(float(1e300), f32::MAX);
         assert_eq!(float(f64::INFINITY), f32::MAX);
         assert_eq!(float(f64::NAN), f32::MAX);

@@ -1,4 +1,4 @@
-//! Reads OpenEXR pictures back, this program's and others'.
+//! Reads OpenEXR pictures, written by this or another program.
 
 use super::error::{FileError, open};
 use exr::error::Error;
@@ -17,7 +17,7 @@ const MOST_EXPANSION: u64 = 1032;
 /// can be smaller still, and this much memory does no harm.
 const HARMLESS: u64 = 64 << 20;
 
-/// Pixels a side: the scene format's limit.
+/// Pixels per side: the scene format's limit.
 const MAX_SIDE: usize = 65536;
 
 /// A picture, row by row from the top left. Every value is finite.
@@ -48,9 +48,9 @@ pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
     // From memory: a damaged offset then can't make the system call fail, as if access were at fault.
     decode(Cursor::new(bytes.as_slice())).map_err(|e| match e {
         Error::Io(e) => FileError::reading(path, &e),
-        Error::Invalid(what) => FileError::content(path, format!("no usable EXR: {what}")),
+        Error::Invalid(what) => FileError::content(path, format!("invalid EXR: {what}")),
         Error::NotSupported(what) => FileError::content(path, format!("unsupported EXR: {what}")),
-        Error::Aborted => FileError::content(path, "reading was given up"),
+        Error::Aborted => FileError::content(path, "reading was aborted"),
     })
 }
 
@@ -61,7 +61,7 @@ fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
         let size = header.layer_size;
         if size.0 > MAX_SIDE || size.1 > MAX_SIDE {
             return Err(invalid(format!(
-                "{} x {} pixels; a side has at most {MAX_SIDE}",
+                "it has {} x {} pixels, but a side has at most {MAX_SIDE}",
                 size.0, size.1
             )));
         }
@@ -69,7 +69,7 @@ fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
         let bytes = (size.area() as u64).saturating_mul(header.channels.bytes_per_pixel as u64);
         if bytes > most {
             return Err(invalid(format!(
-                "{} x {} pixels cannot be in {length} bytes",
+                "it claims {} x {} pixels, but has only {length} bytes",
                 size.0, size.1
             )));
         }
@@ -126,7 +126,7 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
     let samples = match find("samples").map(|c| &c.sample_data) {
         Some(FlatSamples::U32(counts)) if counts.len() == rgb.len() => Some(counts.clone()),
         Some(_) => {
-            let what = "channel samples is not an unsigned integer for each pixel";
+            let what = "channel samples does not have an unsigned integer for each pixel";
             return Err(invalid(what.into()));
         }
         None => None,
@@ -171,7 +171,10 @@ fn interleave<const N: usize>(
             return Err(invalid(format!("channel {} is subsampled", channel.name)));
         }
         if matches!(channel.sample_data, FlatSamples::U32(_)) {
-            return Err(invalid(format!("channel {} is of integers", channel.name)));
+            return Err(invalid(format!(
+                "channel {} has integer values",
+                channel.name
+            )));
         }
         let values = channel.sample_data.values_as_f32();
         for (i, (pixel, value)) in out.iter_mut().zip(values).enumerate() {
@@ -209,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_survived_and_nearly_always_seen() {
+    fn damaged_files_never_panic_and_are_nearly_always_refused() {
         let good = bytes();
         let expected = decode(Cursor::new(&good)).unwrap();
         let mut unseen = 0;
@@ -282,12 +285,12 @@ mod tests {
             (errors(&all[1..], 0.5), "only some of the error channels"),
             (
                 errors(&["samples"], 0.5),
-                "channel samples is not an unsigned",
+                "channel samples does not have an unsigned",
             ),
             (vec![("Y", floats(1.0))], "no channel R; it has Y"),
             (
                 vec![("R", integers), ("G", floats(1.0)), ("B", floats(1.0))],
-                "channel R is of integers",
+                "channel R has integer values",
             ),
         ] {
             let error = foreign(&channels).unwrap_err().to_string();
@@ -296,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn garbled_bytes_are_survived() {
+    fn random_bytes_never_panic() {
         let good = bytes();
         let mut state = 1u32;
         // xorshift32

@@ -1,4 +1,4 @@
-//! What a picture's header says of its origin: the same keys in EXR and PNG.
+//! Metadata in picture headers: the same keys in EXR and PNG.
 
 use crate::provenance::{Provenance, integrator_name, light_name};
 
@@ -19,7 +19,7 @@ impl std::fmt::Display for Value {
     }
 }
 
-/// Keys and values, in a fixed order. What is not known, a title or a relative error, is left out.
+/// Keys and values, in a fixed order. Unknown values, such as a missing title or relative error, are left out.
 pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
     let text = |s: &str| Some(Value::Text(s.into()));
     let number = |x: f64| Some(Value::Number(x));

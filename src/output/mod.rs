@@ -1,4 +1,4 @@
-//! Pictures, reports and how any file is written.
+//! Writes pictures, reports and other files.
 
 pub mod atomic;
 pub mod error;
@@ -38,11 +38,11 @@ impl Format {
             Some("exr") => Ok(Self::Exr),
             Some("png") => Ok(Self::Png),
             Some(other) => Err(format!(
-                "{}: unknown picture format \".{other}\"; allowed are .exr and .png",
+                "{}: unknown picture format \".{other}\"; use .exr or .png",
                 path.display()
             )),
             None => Err(format!(
-                "{}: a picture's name ends in .exr or .png",
+                "{}: the name of a picture must end in .exr or .png",
                 path.display()
             )),
         }
@@ -74,7 +74,7 @@ mod tests {
         assert_eq!(of("x.tiff.Png"), Ok(Format::Png));
         let wrong = of("x.tiff").unwrap_err();
         assert!(
-            wrong.contains("\".tiff\"") && wrong.contains(".exr and .png"),
+            wrong.contains("\".tiff\"") && wrong.contains("use .exr or .png"),
             "{wrong}"
         );
         for none in ["x", ".exr", "exr", "a.exr/"] {

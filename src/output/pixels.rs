@@ -1,4 +1,4 @@
-//! What each pixel of the whole picture says, for writers that ask in their own order.
+//! Estimates of all pixels of the picture, in any order of access.
 
 use crate::film::coverage::Rect;
 use crate::film::{Estimate, Film, REPLICATES, replicate_counts};
@@ -34,7 +34,7 @@ impl<'a> Pixels<'a> {
         }
     }
 
-    /// What pixel (x, y) of the picture says; `None` where it has no samples.
+    /// The estimate of pixel (x, y) of the picture; `None` if it has no samples.
     pub fn at(&self, x: u32, y: u32) -> Option<Estimate> {
         if !self.film.bounds.contains(x, y) {
             return None;

@@ -1,4 +1,4 @@
-//! PNG pictures: 8 bits a channel, sRGB.
+//! PNG pictures: 8 bits per channel, sRGB.
 
 use super::atomic;
 use super::error::FileError;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::io::{self, Write};
 use std::path::Path;
 
-/// What a run did. Numbers that are not known are null, never NaN.
+/// A run summary. Unknown numbers are null, never NaN.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// Version of the program.
@@ -20,7 +20,7 @@ pub struct Report {
     pub scene: String,
     /// Hash of scene and settings.
     pub scene_hash: String,
-    /// What it ran on.
+    /// The device.
     pub adapter: Adapter,
     /// Width and height of the whole picture.
     pub resolution: [u32; 2],
@@ -28,7 +28,7 @@ pub struct Report {
     pub regions: Vec<[u32; 4]>,
     /// Seed.
     pub seed: u32,
-    /// Samples of a pixel that has any, on average, those of earlier runs included.
+    /// Mean samples per pixel over the pixels that have samples, including samples of earlier runs.
     #[serde(serialize_with = "count_or_mean")]
     pub spp: f64,
     /// Which condition ended the run.
@@ -75,7 +75,7 @@ pub struct Seconds {
     pub total: f64,
 }
 
-/// What only the run itself knows.
+/// The facts about a run that are not in the film.
 #[derive(Debug, Clone)]
 pub struct Run<'a> {
     /// The scene file's name as it was given.
@@ -93,7 +93,7 @@ pub struct Run<'a> {
 }
 
 impl Report {
-    /// The report of `run`, which has left `film`.
+    /// The report of `run`, which produced `film`.
     pub fn new(run: Run, film: &Film, provenance: &Provenance) -> Self {
         let rate = |count: u64| {
             let seconds = run.seconds.render;
@@ -132,8 +132,8 @@ impl Report {
 
     /// Indented JSON and a line break, keys in the order of the fields.
     pub fn to_json(&self) -> String {
-        // Strings, numbers, lists and fixed keys: nothing that could fail. serde_json writes what is
-        // not finite as null.
+        // This can't fail: the report has only strings, numbers, lists and fixed keys. serde_json writes numbers that
+        // are not finite as null.
         let mut json = serde_json::to_string_pretty(self).expect("a report is plain data");
         json.push('\n');
         json
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_those_of_the_command_line_s_description() {
+    fn keys_are_those_of_the_interface() {
         let rect = Rect::whole([2, 1]);
         let mut film = Film::new([2, 1], rect, 1);
         film.put_samples(rect, 0..4, vec![[[0.5, 0.5, 0.5, 0.25]; 4]; 2]);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_is_null() {
+    fn unknown_values_are_null() {
         let rect = Rect::whole([1, 1]);
         let mut film = Film::new([1, 1], rect, 1);
         film.put_samples(rect, 0..1, vec![[[f64::INFINITY; 4]; 4]]);

@@ -10,13 +10,12 @@ use std::path::Path;
 /// The environment variable that makes [`assert_golden`] write its golden instead.
 pub const BLESS: &str = "ETENDUE_BLESS";
 
-/// Panics unless `film` shows the same as the picture in `golden` up to the noise of both. The text of the panic says
-/// what differs, where and by how much, where the report of it lies (`NAME.report.html` beside the golden), and
-/// how to bless. With [`BLESS`] set the film becomes the golden.
+/// Panics unless `film` equals the picture in `golden` up to the noise of both. The panic message says
+/// what differs, where and by how much, names the report (`NAME.report.html` beside the golden), and explains
+/// how to bless. If [`BLESS`] is set, writes the film as the golden instead.
 ///
-/// Give the film as many samples as the golden has, and another seed: [`Settings::seed`] may come from the
-/// clock. A golden that is missing, damaged, without error layers, of another size or of another scene is a
-/// failure too, never a pass.
+/// The film should have as many samples as the golden, and another seed; [`Settings::seed`] may come from the
+/// clock. Also panics if the golden is missing, damaged, without error layers, of another size or of another scene.
 ///
 /// [`Settings::seed`]: crate::settings::Settings::seed
 ///
@@ -81,7 +80,7 @@ pub fn assert_golden(golden: &Path, film: &Film, provenance: &Provenance) {
     }
     if let Err(why) = check(golden, film, &provenance) {
         panic!(
-            "{why}\nif the change is meant, {BLESS}=1 with the same test makes {} anew",
+            "{why}\nif the change is intended, run the same test with {BLESS}=1 to re-create {}",
             golden.display()
         );
     }
@@ -91,7 +90,7 @@ fn check(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), String
     let golden = Picture::read(path).map_err(|e| e.to_string())?;
     if golden.origin("scene_hash") != Some(&provenance.scene_hash) {
         return Err(format!(
-            "{}: this golden is of another scene or of other settings, by its hash",
+            "{}: this golden is of another scene or has other settings (its hash differs)",
             path.display()
         ));
     }
@@ -104,8 +103,8 @@ fn check(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), String
     let page = html::page(&golden, &actual, &comparison);
     let written = atomic::replace(&report, |f| f.write_all(page.as_bytes()));
     let place = match written {
-        Ok(()) => format!("the report is {}", report.display()),
-        Err(e) => format!("there is no report: {e}"),
+        Ok(()) => format!("report: {}", report.display()),
+        Err(e) => format!("the report could not be written: {e}"),
     };
     Err(format!(
         "{} and the film: {}\n{place}",

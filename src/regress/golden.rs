@@ -1,4 +1,4 @@
-//! Golden pictures: made with just enough samples, and read back with the settings that made them.
+//! Golden pictures: rendered with just enough samples, and read back with their settings.
 
 use super::{Case, MakeEngine, Trouble, render, text};
 use crate::compare::{Picture, verdict::verdict};
@@ -23,24 +23,24 @@ const FIRST_LOOK: u64 = 64;
 /// How to make goldens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
-    /// Width and height; without, the scene's, made 64 pixels wide.
+    /// Width and height; by default the scene's, scaled to 64 pixels wide.
     pub size: Option<[u32; 2]>,
-    /// The relative change of all light that is to be seen with 95 % probability.
+    /// The relative change of the whole picture's brightness that a comparison shall detect with 95 % probability.
     pub power: f64,
-    /// The most samples a pixel.
+    /// Most samples per pixel.
     pub most_samples: u64,
-    /// The false-alarm rate at which it is to be seen.
+    /// The false-alarm rate of that comparison.
     pub alpha: f64,
 }
 
-/// What a golden is like.
+/// The properties of a golden.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bless {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u64,
-    /// The relative change of all light that a comparison sees.
+    /// The relative change of the whole picture's brightness that a comparison detects.
     pub power: f64,
     /// Whether that is less than was wanted, for the samples ran out.
     pub short: bool,
@@ -53,35 +53,38 @@ impl fmt::Display for Bless {
         let [w, h] = self.size;
         let (samples, bytes, power) = (self.samples, self.bytes, 100.0 * self.power);
         let s = if samples == 1 { "" } else { "s" };
-        write!(f, "{w}x{h}, {samples} sample{s} a pixel, {bytes} bytes; ")?;
+        write!(f, "{w}x{h}, {samples} sample{s} per pixel, {bytes} bytes; ")?;
         if self.power >= 1.0 {
-            return f.write_str("too noisy to see any change of all light");
+            return f.write_str("too noisy to detect a change of the whole picture's brightness");
         }
-        write!(f, "sees a change of all light by {power:.2} %")
+        write!(
+            f,
+            "detects a change of the whole picture's brightness by {power:.2} %"
+        )
     }
 }
 
 impl Bless {
-    /// What to say of a golden that sees less than was `wanted`.
+    /// A warning if comparisons detect only larger changes than `wanted`.
     pub fn warning(&self, wanted: f64) -> Option<String> {
         let sees = if self.power >= 1.0 {
-            "not see even that all light has doubled".to_owned()
+            "not detect even a doubling of the whole picture's brightness".to_owned()
         } else {
             format!(
-                "see a change of all light by {:.2} % or more",
+                "detect a change of the whole picture's brightness by {:.2} % or more",
                 100.0 * self.power
             )
         };
         self.short.then(|| {
             format!(
-                "comparisons with this golden will {sees}, and {:.2} % was wanted: --max-spp allows no more samples",
+                "comparisons with this golden will {sees}, but --power asks for {:.2} %; raise --max-spp",
                 100.0 * wanted
             )
         })
     }
 }
 
-/// Renders the case's scene with just enough samples and makes that its golden; `None` when `stop` was set.
+/// Renders the case's scene with just enough samples, and writes it as the golden. `None` if `stop` was set.
 pub fn bless(
     case: &Case,
     engine: &MakeEngine,
@@ -123,7 +126,7 @@ pub fn bless(
             return Ok(None);
         }
         let picture = Picture::from_film(path.display().to_string(), &film, &provenance)?;
-        // Held against itself, it says what a comparison with its like would have seen.
+        // Compared with itself, it gives the sensitivity of a comparison with a similar picture.
         let seen = verdict(&picture, &picture, wanted.alpha).sensitivity;
         let power = seen.first().map_or(f64::INFINITY, |s| s.change);
         if power <= wanted.power || samples >= most {
@@ -156,14 +159,14 @@ fn steps(round: u64, most: u64) -> Result<(u64, u64), String> {
     let most = most / step * step;
     if most < 2 * round {
         return Err(format!(
-            "--max-spp is too low: a golden of this scene takes {} samples a pixel or more, for its error must be known",
+            "--max-spp is too low: to estimate its error, a golden of this scene needs at least {} samples per pixel",
             2 * round
         ));
     }
     Ok((step, most))
 }
 
-/// What a golden's header says that it takes to make its like.
+/// The settings in a golden's header, with which it can be rendered again.
 pub(super) struct Facts {
     pub scene_hash: String,
     pub samples: u64,
@@ -180,10 +183,10 @@ impl Facts {
     pub fn read(golden: &Picture) -> Result<Self, String> {
         let (name, find) = (&golden.name, |key| golden.origin(key));
         let lacks =
-            |key: &str| format!("{name}: its header says nothing of {key}; --bless makes it anew");
+            |key: &str| format!("{name}: its header has no {key}; re-create it with --bless");
         let noise = golden.noise.as_ref().ok_or_else(|| {
             format!(
-                "{name}: it lacks error layers, samples, or two replicates; --bless makes it anew"
+                "{name}: it has no error layers, no sample counts, or fewer than two replicates; re-create it with --bless"
             )
         })?;
         let samples = noise.samples[0];
@@ -220,7 +223,7 @@ impl Facts {
         })
     }
 
-    /// The golden's settings with another seed: noise that is shared is no evidence.
+    /// The golden's settings with another seed: with the same seed both would have the same noise.
     pub fn settings(&self, scene: &Scene) -> Settings {
         let overrides = Overrides {
             size: Some(self.size),
@@ -244,11 +247,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_golden_has_more_samples_than_it_may_have() {
+    fn goldens_respect_max_spp() {
         assert_eq!(steps(4, 4096), Ok((16, 4096)));
         assert_eq!(steps(4, 100), Ok((16, 96)));
         assert_eq!(steps(4, 15), Ok((4, 12)));
         assert_eq!(steps(4, 8), Ok((4, 8)));
-        assert!(steps(4, 7).is_err_and(|e| e.contains("takes 8 samples a pixel or more")));
+        assert!(steps(4, 7).is_err_and(|e| e.contains("needs at least 8 samples per pixel")));
     }
 }

@@ -1,8 +1,9 @@
-//! Image regression: a folder's scenes against their golden pictures, and the same verdict as an assertion.
+//! Image regression tests: compares the scenes of a folder with their golden pictures, and offers the same test as an
+//! assertion.
 //!
-//! `DIR/NAME.toml` is rendered and compared with `DIR/golden/NAME.exr`, with as many samples as the golden has (the
-//! verdict is exact then) and another seed. What fails leaves its film, `NAME.actual.npz`, and the page
-//! of the comparison, `NAME.report.html`, beside the golden.
+//! Renders `DIR/NAME.toml` and compares it with `DIR/golden/NAME.exr`, with as many samples as the golden has (the
+//! test is exact then) and another seed. A failure leaves its film `NAME.actual.npz` and its report
+//! `NAME.report.html` beside the golden.
 
 mod assertion;
 mod golden;
@@ -25,11 +26,11 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Makes an engine for a scene, and says how many pixels to give it at once.
+/// Makes an engine for a scene, and returns the most pixels per call.
 pub type MakeEngine<'a> =
     dyn Fn(&World, &Settings) -> Result<(Box<dyn Engine>, u64), Trouble> + Sync + 'a;
 
-/// Why there is nothing to judge.
+/// Why a case could not be compared.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Trouble {
     /// The scene or the golden can't be used; why.
@@ -66,7 +67,7 @@ pub struct Case {
     pub golden: bool,
 }
 
-/// What became of a case.
+/// The result of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// The same up to its noise.
@@ -104,13 +105,16 @@ impl Outcome {
         matches!(self, Outcome::Passed(_) | Outcome::Blessed(_))
     }
 
-    /// What there is to say in one line.
+    /// The result in one line.
     pub fn detail(&self, case: &Case) -> String {
         match self {
             Outcome::Passed(c) | Outcome::Failed(c) => c.sentence(),
-            Outcome::New => format!("no {}: --bless makes it", case.golden_path().display()),
+            Outcome::New => format!(
+                "{} does not exist; create it with --bless",
+                case.golden_path().display()
+            ),
             Outcome::Orphaned => format!(
-                "no {}: remove the golden if that is meant",
+                "{} does not exist; remove the golden if this is intended",
                 case.scene_path().display()
             ),
             Outcome::Unusable(why) | Outcome::NoDevice(why) => why.clone(),
@@ -186,8 +190,8 @@ impl Case {
         let mut provenance = Provenance::new(&scene, source, &settings);
         if provenance.scene_hash != facts.scene_hash {
             return Err(format!(
-                "{} is of another scene than {} now holds (hash {} and {}); if the change is meant, --bless makes it \
-                 anew",
+                "{} is of another scene than {} (hash {} and {}); if the change is intended, re-create the golden with \
+                 --bless",
                 self.golden_path().display(),
                 self.scene_path().display(),
                 short(&facts.scene_hash),
@@ -239,7 +243,7 @@ fn text(e: impl std::fmt::Display) -> String {
     e.to_string()
 }
 
-/// The first letters of a hash: enough to tell two apart.
+/// The first letters of a hash, enough to distinguish two.
 fn short(hash: &str) -> String {
     hash.chars().take(12).collect()
 }

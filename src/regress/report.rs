@@ -1,4 +1,4 @@
-//! What a regression run found: JUnit for machines, a page for people.
+//! The results of a regression run: as JUnit XML and as an HTML page.
 
 use super::{Case, Outcome};
 use crate::compare::{Picture, html};
@@ -12,7 +12,7 @@ const TEMPLATE: &str = include_str!("index.html");
 pub struct Done {
     /// The case.
     pub case: Case,
-    /// What became of it.
+    /// Its result.
     pub outcome: Outcome,
     /// Golden and actual picture, where there are both.
     pub pictures: Option<[Picture; 2]>,

@@ -1,37 +1,36 @@
-//! Runs whose samples go where the noise is: see [`crate::film::pilot`] for how that is known.
+//! Adaptive runs: noisy tiles get more samples. [`crate::film::pilot`] explains how the noise is measured.
 //!
-//! Up to [`even`] samples all pixels are alike. From there on the mean number of samples grows through the counts at
-//! which the error may be looked at; what each tile has at one of them follows from the pilots alone, and what it has
-//! in between lies on a straight line. So a tile's samples depend on the mean that was reached, and not
-//! on how it was.
+//! Up to [`even`] samples all pixels get the same number. From there on the mean number of samples grows through the counts
+//! at which the error is checked. The pilots alone decide how many samples each tile has at such a count; between two
+//! counts the number is interpolated linearly. So a tile's samples depend on the mean that was reached, but not on the
+//! calls or runs that reached it.
 
 use super::{Run, StopReason, next_check, paths};
 use crate::engine::{EngineError, Part};
 use crate::film::coverage::Rect;
 use crate::film::pilot::Pilot;
 use crate::film::{BLOCK, Film, REPLICATES};
+use crate::kernel::pilot_seed;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// The mean number of samples up to which all pixels are alike, about: fewer could not pay for a pilot.
+/// The approximate number of samples up to which all pixels get the same: with fewer, a pilot costs more than it gains.
 const EVEN: u64 = 32;
 
-/// The first pilot has this part of those samples.
+/// The first pilot has this fraction of those samples.
 const FIRST_PILOT: u64 = 8;
 
-/// Each pilot lasts until the mean has grown by this factor; together they then double. Rarely, for four samples a pixel
-/// are many in a tile: sixteen steer no more than 1 % better on any scene measured, and would cost 5 %.
+/// After each pilot the mean grows by this factor before the next one, which doubles the number of pilot samples. Pilots are
+/// rare because four samples per pixel are already many in a tile: sixteen give at most 1 % less error on any scene measured,
+/// and cost 5 %.
 const PILOT_LASTS: u64 = 16;
-
-/// What makes a pilot's seed differ from the picture's.
-const PILOT_SEED: u32 = 0x9e37_79b9;
 
 /// See [`EVEN`]; whole rounds of all replicates.
 fn even(round: u64) -> u64 {
     next_check(EVEN - 1, round)
 }
 
-/// How many pilots decide how the samples beyond the mean `goal` before it are spread.
+/// The number of pilots that decide how samples are distributed up to the mean `goal`.
 fn stages_for(goal: u64, round: u64) -> usize {
     let mut until = even(round);
     let mut stages = 0;
@@ -136,8 +135,8 @@ impl Run<'_> {
         }
     }
 
-    /// The next mean at which the error may be looked at. Where that ends no run some are passed over: the more samples a
-    /// call has for each pixel, the less it costs.
+    /// The next mean at which the error is checked. If the error can't end the run, skips some: calls with more samples per
+    /// pixel are cheaper.
     fn next_check(&self, mean: u64) -> u64 {
         let round = self.job.round;
         let mut check = next_check(mean, round);
@@ -159,14 +158,14 @@ impl Run<'_> {
         }
     }
 
-    /// The pilot that is still to be made for samples up to the mean `check`.
+    /// The pilot that must still be rendered for samples up to the mean `check`.
     fn lacks_pilot(&self, check: u64) -> Option<usize> {
         let made = self.film.pilot.as_ref().map_or(0, Pilot::stages);
         let ends_before = self.job.samples.end <= even(self.job.round);
         (!ends_before && made < stages_for(check, self.job.round)).then_some(made)
     }
 
-    /// Whether the time would be over before half of a pilot were done.
+    /// Whether the time would be used up before half of a pilot is done.
     fn too_late_for_pilot(&self, stage: usize) -> bool {
         let samples = pilot_samples(stage, self.job.round);
         let tiles = self.job.tiles.iter().zip(std::iter::repeat(samples));
@@ -179,9 +178,9 @@ impl Run<'_> {
         self.tally.seconds + self.pace.unwrap_or(0.0) * half > time.as_secs_f64()
     }
 
-    /// Renders a pilot, in pieces that are forgotten once they are measured; false when it was stopped.
+    /// Renders a pilot in pieces, and drops each piece once its noise is measured. Returns false if it was stopped.
     fn make_pilot(&mut self, stage: usize, seed: u32) -> Result<bool, EngineError> {
-        self.engine.reseed(seed ^ PILOT_SEED);
+        self.engine.reseed(pilot_seed(seed));
         let done = self.measure(pilot_samples(stage, self.job.round));
         self.engine.reseed(seed);
         done
@@ -217,7 +216,7 @@ impl Run<'_> {
         done
     }
 
-    /// What pixels of the job's tile `tile` lack next of their samples, each up to the end of a block.
+    /// The next samples that pixels of the job's tile `tile` need, each up to the end of a block.
     fn lacking(&self, tile: Rect, tiles: &[Rect], wanted: &[u64]) -> Vec<Part> {
         let here = tiles.iter().zip(wanted);
         let here = here.filter_map(|(t, &n)| Some((t.intersection(&tile)?, n)));
@@ -231,7 +230,7 @@ impl Run<'_> {
         next.filter(|p| p.paths() > 0).collect()
     }
 
-    /// What of these parts a call can do in time: of each the same share, but one sample at least.
+    /// Shortens the parts to what one call can do in time: by the same factor, but to at least one sample each.
     fn in_time(&self, mut parts: Vec<Part>) -> Vec<Part> {
         let share = match self.pace {
             Some(pace) => self.job.call.as_secs_f64() / (pace * paths(&parts)),
@@ -246,12 +245,12 @@ impl Run<'_> {
         parts
     }
 
-    /// The largest mean up to `goal` that the time allows.
+    /// The largest mean, at most `goal`, that the remaining time allows.
     fn affordable(&self, mean: u64, goal: u64) -> u64 {
         let Some(time) = self.job.time else {
             return goal;
         };
-        // Before anything is known: the first samples alone.
+        // The speed is not known yet: take only the first samples.
         if self.tally.counters.paths == 0 {
             return goal.min(mean + 1);
         }
@@ -261,7 +260,7 @@ impl Run<'_> {
         goal.min((reached as u64).max(mean + 1))
     }
 
-    /// Whether the tiles have these samples and no more.
+    /// Whether the tiles have exactly these samples.
     fn has_just(&self, tiles: &[Rect], wanted: &[u64]) -> bool {
         let all = tiles
             .iter()

@@ -11,7 +11,7 @@ struct Fake {
     nap: Duration,
     fail_at: Option<usize>,
     seed: u32,
-    /// Whether it goes on with its seed when it is told another.
+    /// Whether it ignores `reseed` and keeps its seed.
     deaf: bool,
     value: fn(u64) -> f64,
 }
@@ -221,9 +221,9 @@ fn the_error_ends_a_run_at_the_same_sample_however_slow_the_machine() {
     assert_eq!(ends[0], ends[1]);
 }
 
-/// The noise of the fake engine is white, so the fitted law is the true one: what is left of it is chance.
+/// The noise of the fake engine is white, so the extrapolation is exact except for random fluctuations.
 #[test]
-fn forecasts_of_the_error_come_true() {
+fn forecasts_of_the_error_are_accurate() {
     let size = [32, 32];
     let mut film = Film::new(size, Rect::whole(size), 2);
     let mut job = job(size, 512, 0..1 << 20);
@@ -259,7 +259,7 @@ fn checks_are_whole_rounds_of_all_replicates() {
     assert_eq!(checks(4), [16, 32, 48, 64, 80, 112]);
     assert_eq!(next_check(0, 1), 16);
     assert_eq!(next_check(0, 9), 36);
-    // A forecast may ask for what lies beyond all samples, whatever the round.
+    // A forecast may pass counts beyond the largest sample count, for every size of a round.
     for round in [1, 4, 9, 1 << 20] {
         assert!(next_check(u64::MAX, round) > u64::from(u32::MAX));
     }
@@ -267,7 +267,7 @@ fn checks_are_whole_rounds_of_all_replicates() {
 
 /// An error that no run reaches is no reason not to end.
 #[test]
-fn errors_out_of_reach_leave_the_other_conditions() {
+fn unreachable_errors_do_not_disable_other_conditions() {
     let size = [8, 8];
     for error in [1e-8, 1e-20, 1e-100, 1e-320] {
         let mut film = Film::new(size, Rect::whole(size), 2);
@@ -333,7 +333,7 @@ fn a_failing_device_leaves_what_was_done() {
 }
 
 #[test]
-fn a_stop_flag_is_heeded_between_calls() {
+fn the_stop_flag_is_checked_between_calls() {
     let size = [8, 8];
     let mut film = Film::new(size, Rect::whole(size), 2);
     let job = job(size, 64, 0..1_000_000);
@@ -379,7 +379,7 @@ fn mean_of_adaptive_pictures(deaf: bool) -> (f64, f64) {
 }
 
 #[test]
-fn adaptive_pictures_are_unbiased_and_would_not_be_if_they_steered_themselves() {
+fn adaptive_pictures_are_unbiased_because_of_separate_pilots() {
     let (mean, error) = mean_of_adaptive_pictures(false);
     assert!((mean - 1.0).abs() < 3.0 * error, "{mean} ± {error}");
     // With the picture's own first samples for a pilot, tiles that had luck get more samples, and it counts for less.
@@ -388,7 +388,7 @@ fn adaptive_pictures_are_unbiased_and_would_not_be_if_they_steered_themselves() 
     println!("unbiased {mean}, steered by itself {biased}, each ± {error}");
 }
 
-/// Where calls are cut, and where a run is left and gone on with, touches no bit.
+/// The picture's bits do not depend on how a run is cut into calls, or where it is interrupted and resumed.
 #[test]
 fn an_adaptive_film_does_not_depend_on_how_it_was_made() {
     let size = [80, 48];
@@ -439,7 +439,7 @@ fn an_adaptive_forecast_grows_to_its_end() {
     assert!(last > 0.99 && fractions[0] < 0.1, "{last}");
 }
 
-/// All tiles are called at once, each for the samples that it lacks.
+/// One call covers all tiles, each with the samples that it needs.
 #[test]
 fn an_adaptive_wave_is_a_few_large_calls() {
     let size = [80, 48];

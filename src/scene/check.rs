@@ -1,4 +1,4 @@
-//! Lints: warnings about what is legal in a scene, but probably not what its author meant.
+//! Lints: warnings about valid scenes that are probably not what their author meant.
 
 mod coincide;
 mod cross;
@@ -37,7 +37,7 @@ impl Warnings {
     }
 }
 
-/// Warnings about what is legal but suspect, in no order of severity. Most scenes have none.
+/// Warnings about what is valid but suspect, in no order of severity. Most scenes have none.
 ///
 /// There are none for a closed room of opaque walls, with things that stand on its floor and lamps flush on its ceiling.
 pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
@@ -52,7 +52,7 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
         let mut skipped = Warnings::default();
         skipped.add(Place::default(), || {
             format!(
-                "{things} primitives and lights: with more than {MAX_PAIRWISE} they are not \
+                "the scene has {things} primitives and lights; with more than {MAX_PAIRWISE} they are not \
                  searched for surfaces that coincide or cross, or hide a light"
             )
         });
@@ -64,7 +64,7 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
 
     let mut diagnostics = Vec::new();
     for Warnings { first, more } in kinds {
-        let counted = format!("{more} more warnings like the last");
+        let counted = format!("{more} more warnings of this kind");
         let counted = (more > 0).then(|| (Place::default(), counted));
         let all = first.into_iter().chain(counted);
         diagnostics.extend(all.map(|(place, message)| Diagnostic {
@@ -88,7 +88,7 @@ fn materials(scene: &Scene) -> Warnings {
     for (material, used) in scene.materials.iter().zip(used) {
         let (name, place) = (quoted(&material.name), material.place);
         match material.bsdf {
-            _ if !used => warnings.add(place, || format!("material {name} is used by nothing")),
+            _ if !used => warnings.add(place, || format!("material {name} is not used")),
             Bsdf::Dielectric {
                 ior: 1.0,
                 transmittance,
@@ -192,7 +192,7 @@ radiance = [9, 9, 9]
 
     #[test]
     fn idle_materials() {
-        let idle = "test.toml:12:1: material \"glass\" is used by nothing";
+        let idle = "test.toml:12:1: material \"glass\" is not used";
         assert!(warned(&room(), idle));
         assert!(!warned(&room(), "material \"white\""));
         let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'ghost'\n";
@@ -213,14 +213,14 @@ radiance = [9, 9, 9]
         let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'red'\n";
         // Six spheres in one place are fifteen pairs.
         let text = ball.repeat(6);
-        assert!(warned(&text, "5 more warnings like the last"));
+        assert!(warned(&text, "5 more warnings of this kind"));
         assert!(!warned(&ball.repeat(5), "more warnings"));
     }
 
     #[test]
     fn large_scenes_are_not_searched_for_pairs() {
         let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'red'\n";
-        let skipped = "2001 primitives and lights: with more than 2000";
+        let skipped = "the scene has 2001 primitives and lights; with more than 2000";
         let large = ball.repeat(MAX_PAIRWISE);
         assert!(warned(&large, skipped) && !warned(&large, "coincides with"));
         let largest_searched = ball.repeat(MAX_PAIRWISE - 1);
@@ -235,7 +235,8 @@ radiance = [9, 9, 9]
             (p.line, p.column) = (0, 0);
         }
         let messages: Vec<String> = lint(&scene).iter().map(|w| w.message.clone()).collect();
-        let expected = "the sphere coincides with the sphere, which is met first from either side";
+        let expected =
+            "the sphere coincides with the sphere, which rays meet first from both sides";
         assert!(messages.iter().any(|m| m == expected), "{messages:?}");
     }
 }

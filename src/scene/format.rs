@@ -1,5 +1,5 @@
-//! What each table of a scene file holds. This is the one place that says so: the parser walks it
-//! with the file in hand, the schema walks it to write down the keys.
+//! Defines what each table of a scene file contains. The parser uses these definitions to read a file, and the schema uses
+//! them to list the keys.
 
 use super::value::{
     Angle, Count, Direction, Exponent, Ior, LARGEST_STRATA, Point, Radiance, Radius, Resolution,
@@ -74,15 +74,15 @@ pub(super) trait Table {
 
 /// `[camera]`.
 pub(super) fn camera(t: &mut impl Table) -> Option<Camera> {
-    /// Sine of the smallest angle between `up` and the view; below it rounding decides what is up.
+    /// Sine of the smallest angle between `up` and the view. Below it, rounding would decide the picture's top.
     const PARALLEL: f64 = 1e-9;
 
     let eye = t.required::<Point>("eye", "Position of the pinhole.");
-    let look_at = t.required::<Point>("look_at", "A point in the middle of the picture.");
+    let look_at = t.required::<Point>("look_at", "The point at the centre of the picture.");
     let up = t.defaulted(
         "up",
         Direction(DVec3::Y),
-        "Points to the picture's top; any length, not parallel to the view.",
+        "Direction of the picture's top. Any length, but not parallel to the view.",
     );
     let vfov = t.required::<Angle>("vfov", "Vertical field of view in degrees.");
     let resolution = t.required::<Resolution>("resolution", "Width and height in pixels.");
@@ -91,14 +91,14 @@ pub(super) fn camera(t: &mut impl Table) -> Option<Camera> {
     let view = look_at - eye;
     let view = normalized(view).filter(|_| view.length() >= SMALLEST);
     let Some(view) = view else {
-        let message = format!("look_at is at eye, but must be at least {SMALLEST:e} away from it");
+        let message = format!("look_at equals eye, but must be at least {SMALLEST:e} away from it");
         t.refuse("look_at", message);
         return None;
     };
     let up = up?.0;
     if view.cross(up).length() < PARALLEL {
         let message = format!(
-            "up, along {}, is parallel to the view, along {}; it must not be",
+            "up (direction {}) is parallel to the view (direction {}), but must not be",
             brief(up),
             brief(view)
         );
@@ -126,17 +126,17 @@ pub(super) fn render(t: &mut impl Table) -> RenderHints {
     let max_depth = t.optional(
         "max_depth",
         Some(Count::<1, { u32::MAX }>(DEFAULT_MAX_DEPTH)),
-        "Path vertices after the eye: 1 sees lights only, 2 adds direct light, and so on.",
+        "Most path vertices after the eye: 1 shows only lights, 2 adds direct light, and so on.",
     );
     let strata = t.optional(
         "strata",
         Some(Count::<1, LARGEST_STRATA>(DEFAULT_STRATA)),
-        "The pixel is divided into strata x strata jittered cells.",
+        "Each pixel is divided into strata x strata jittered cells.",
     );
     let seed = t.optional(
         "seed",
         Some(Count::<0, { u32::MAX }>(0)),
-        "Seed of every random number.",
+        "Seed of the random numbers.",
     );
     RenderHints {
         max_depth: max_depth.map(|c| c.0),
@@ -168,11 +168,11 @@ impl MaterialKind {
 
     pub(super) fn about(self) -> &'static str {
         match self {
-            Self::Diffuse => "Lambertian reflection; both sides.",
-            Self::Mirror => "Perfect mirror; both sides.",
-            Self::Dielectric => "Smooth boundary of a solid such as glass; not for disks.",
+            Self::Diffuse => "Lambertian reflection on both sides.",
+            Self::Mirror => "Perfect mirror on both sides.",
+            Self::Dielectric => "Smooth boundary of a solid such as glass. Not allowed on disks.",
             Self::Phong => {
-                "Modified Phong (Lafortune & Willems 1994); diffuse + specular at most 1 per channel."
+                "Modified Phong (Lafortune & Willems 1994). diffuse + specular is at most 1 per channel."
             }
         }
     }
@@ -199,7 +199,7 @@ pub(super) fn material(t: &mut impl Table, kind: MaterialKind) -> Option<Bsdf> {
             const GLASS: Ior = Ior(1.52);
             let about = "Index of refraction, inside divided by outside.";
             let ior = t.defaulted("ior", GLASS, about);
-            let about = "Tint, once per refraction.";
+            let about = "Tint, applied once per refraction.";
             let transmittance = t.defaulted("transmittance", Share(DVec3::ONE), about);
             Some(Bsdf::Dielectric {
                 ior: ior?.0,
@@ -214,9 +214,12 @@ fn phong(t: &mut impl Table) -> Option<Bsdf> {
     /// Decimal fractions such as 0.9 + 0.1 may come out above 1 by a rounding.
     const ROUNDING: f64 = 1e-9;
 
-    let diffuse = t.required::<Share>("diffuse", "kd, albedo of the diffuse part.");
-    let specular = t.required::<Share>("specular", "ks, albedo of the whole lobe.");
-    let exponent = t.required::<Exponent>("exponent", "n: the lobe is the nth power of cosine.");
+    let diffuse = t.required::<Share>("diffuse", "kd: albedo of the diffuse part.");
+    let specular = t.required::<Share>("specular", "ks: albedo of the specular lobe.");
+    let exponent = t.required::<Exponent>(
+        "exponent",
+        "n: the lobe is proportional to the cosine to the power n.",
+    );
     let (diffuse, specular) = (diffuse?.0, specular?.0);
     let sum = diffuse + specular;
     if let Some(i) = (0..3).find(|&i| sum[i] > 1.0 + ROUNDING) {
@@ -260,9 +263,9 @@ impl ShapeKind {
         match self {
             Self::Sphere => "A sphere.",
             Self::Plane => {
-                "An infinite plane; if dielectric, the solid is on the side the normal points away from."
+                "An infinite plane. If dielectric, the solid is on the side that the normal points away from."
             }
-            Self::Disk => "A flat disk; not for dielectric materials.",
+            Self::Disk => "A flat disk. Its material must not be dielectric.",
             Self::Cylinder => "A solid cylinder: side and two caps.",
         }
     }
@@ -291,7 +294,10 @@ fn sphere(t: &mut impl Table) -> Option<Shape> {
 
 fn plane(t: &mut impl Table) -> Option<Shape> {
     let point = t.required::<Point>("point", "Any point of the plane.");
-    let normal = t.required::<Direction>("normal", "Perpendicular to the plane; any length.");
+    let normal = t.required::<Direction>(
+        "normal",
+        "Direction perpendicular to the plane. Any length.",
+    );
     Some(Shape::Plane {
         point: point?.0,
         normal: normal?.0,
@@ -300,7 +306,8 @@ fn plane(t: &mut impl Table) -> Option<Shape> {
 
 fn disk(t: &mut impl Table) -> Option<Shape> {
     let center = t.required::<Point>("center", "Centre.");
-    let normal = t.required::<Direction>("normal", "Perpendicular to the disk; any length.");
+    let normal =
+        t.required::<Direction>("normal", "Direction perpendicular to the disk. Any length.");
     let radius = t.required::<Radius>("radius", "Radius.");
     Some(Shape::Disk {
         center: center?.0,
@@ -316,7 +323,7 @@ fn cylinder(t: &mut impl Table) -> Option<Shape> {
     let (base, top) = (base?.0, top?.0);
     // Shorter ones could not be told from nothing in f32, and squares in f64 are safe above.
     if base.distance(top) < SMALLEST {
-        let message = format!("top is at base, but must be at least {SMALLEST:e} away from it");
+        let message = format!("top equals base, but must be at least {SMALLEST:e} away from it");
         t.refuse("top", message);
         return None;
     }
@@ -329,27 +336,31 @@ fn cylinder(t: &mut impl Table) -> Option<Shape> {
 
 /// `[[spheres]]`: the file of rows, and the name of their material if they have one in common.
 pub(super) fn spheres(t: &mut impl Table) -> Option<(String, Option<String>)> {
-    let about = "Comma-separated rows under the names of columns, x, y, z, radius and (without the key material) \
-                 material; relative to the scene file.";
+    let about = "CSV file whose first row names the columns: x, y, z, radius and, without the key material, \
+                 material. Its path is relative to the scene file.";
     let file = t.required::<Text>("file", about);
-    let material = t.optional::<Text>("material", None, "NAME of a [material.NAME], for all.");
+    let material = t.optional::<Text>(
+        "material",
+        None,
+        "NAME of a [material.NAME], for all spheres of the file.",
+    );
     Some((file?.0, material.map(|m| m.0)))
 }
 
 /// `[[lights]]`: the file of rows.
 pub(super) fn lights(t: &mut impl Table) -> Option<String> {
-    let about = "Comma-separated rows under the names of columns, x, y, z, nx, ny, nz, radius, r, g, b (centre, normal, \
-                 radius, radiance); relative to the scene file.";
+    let about = "CSV file whose first row names the columns: x, y, z, nx, ny, nz, radius, r, g, b (centre, normal, \
+                 radius, radiance). Its path is relative to the scene file.";
     t.required::<Text>("file", about).map(|f| f.0)
 }
 
 /// `[[light]]`, at `place` in the file.
 pub(super) fn light(t: &mut impl Table, place: Place) -> Option<Light> {
     let center = t.required::<Point>("center", "Centre.");
-    let about = "Points to the side that emits; any length. The other side is black.";
+    let about = "Direction of the side that emits. Any length. The other side is black.";
     let normal = t.required::<Direction>("normal", about);
     let radius = t.required::<Radius>("radius", "Radius.");
-    let about = "Emitted radiance, the same in every direction of the front.";
+    let about = "Emitted radiance, equal in every direction of the front.";
     let radiance = t.required::<Radiance>("radiance", about);
     Some(Light {
         center: center?.0,

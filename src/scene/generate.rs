@@ -1,4 +1,4 @@
-//! Scenes of many things, made by rule: a sunflower of spheres, and a hall of lamps.
+//! Generates scenes with many objects: spheres placed like the seeds of a sunflower, and a hall of lamps.
 
 use super::parse::parse_with_rows;
 use super::{Diagnostic, Scene};
@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Larger scenes keep their many things in a file of rows.
+/// Larger scenes keep their objects in a CSV file.
 pub const MOST_IN_TABLES: usize = 200;
 
 /// The angle between one seed of a sunflower and the next.
@@ -71,10 +71,10 @@ fn uniform(seed: u32, i: usize, purpose: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// `count` spheres on a floor in the order of a sunflower's seeds: as much of the picture is covered whatever their
-/// number. `rows` names the file for them.
+/// `count` spheres on a floor, placed like the seeds of a sunflower, so that every number of them covers the same part of
+/// the picture. `rows` names their CSV file.
 pub fn spheres(count: usize, seed: u32, rows: &str) -> Generated {
-    // Arms of the spiral, with a stranger here and there.
+    // One material for each arm of the spiral, with a different one here and there.
     let material = |i: usize| {
         if uniform(seed, i, 1) < 0.1 {
             "gloss"
@@ -189,7 +189,7 @@ exponent = 120.0
         }
     }
     let mut list = List::new(count, "x,y,z,nx,ny,nz,radius,r,g,b");
-    // As much light in all, whatever the number.
+    // The total light is the same for every number of lamps.
     let room = (7.4 * 19.0 / count as f64).sqrt();
     let radius = 0.12 * room.min(1.0);
     for i in 0..count {
@@ -270,7 +270,7 @@ mod tests {
     use crate::settings::{Overrides, Settings};
 
     #[test]
-    fn nothing_is_suspect_but_that_spheres_lie_in_the_open() {
+    fn generated_scenes_have_no_warnings_except_open() {
         for make in [spheres, lights] {
             for count in [1, 2, 10, 35, MOST_IN_TABLES] {
                 let made = make(count, 0, "x.csv");
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn few_things_are_tables_and_many_are_rows_with_the_same_meaning() {
+    fn few_objects_are_tables_and_many_are_rows_with_the_same_meaning() {
         for make in [spheres, lights] {
             let few = make(MOST_IN_TABLES, 3, "x.csv");
             assert_eq!(few.rows, None);

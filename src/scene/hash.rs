@@ -1,9 +1,9 @@
 //! The scene hash: two files with the same hash have the same expected picture.
 //!
-//! It covers what the scene means, and the settings that change what the picture converges to. Values count as they are read, so
-//! two ways to write one surface (a plane given by two different points) are two scenes. Equal pictures may have different
-//! hashes, but different pictures never have the same. The order of the file counts only among surfaces of one kind that coincide,
-//! where it decides which of them is met.
+//! It covers the meaning of the scene and the settings that change what the picture converges to. Values
+//! are hashed as they are read, so two descriptions of one surface (such as a plane, given by another of its points) have
+//! different hashes. Scenes that differ never have the same hash. Order in the file counts only among surfaces of one kind
+//! that coincide, since there it decides which one a ray meets.
 
 use super::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
 use crate::settings::{Integrator, LightParts, Settings};
@@ -16,8 +16,8 @@ const DIRECTION_STEP: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// SHA-256, in hexadecimal, of what the picture of `scene` under `settings` converges to.
 ///
-/// Not covered: comments, layout, title, names, materials that nothing uses, order where it means nothing, and settings that change
-/// only the noise (seed, strata, shadow rays).
+/// Not covered: comments, layout, title, names, unused materials, order where it has no effect, and settings that change only
+/// the noise (seed, strata, shadow rays).
 pub fn scene_hash(scene: &Scene, settings: &Settings) -> String {
     hash_of(&Canonical::new(scene), settings)
 }
@@ -257,7 +257,7 @@ mod tests {
     type Edit = (&'static str, fn(&mut Scene, &mut Overrides));
 
     #[test]
-    fn what_means_nothing_does_not_count() {
+    fn changes_without_effect_keep_the_hash() {
         let same: [Edit; 10] = [
             ("title", |s, _| s.title = None),
             ("path and lines", |s, _| {
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_changes_the_expected_picture_counts() {
+    fn changes_of_the_expected_picture_change_the_hash() {
         let other: [Edit; 12] = [
             ("size", |_, f| f.size = Some([6, 8])),
             ("max_depth", |_, f| f.max_depth = Some(63)),

@@ -1,7 +1,7 @@
 //! The scene as its author wrote it: f64, the file's own units and order.
 //!
-//! [`parse`] reads it from TOML, [`schema`] describes that TOML to editors, [`check`] finds what is
-//! legal but suspect, and [`World::new`](crate::world::World::new) makes it ready for rays.
+//! [`parse`] reads it from TOML, [`schema`] describes the format to editors, [`check`] warns about
+//! likely mistakes, and [`World::new`](crate::world::World::new) prepares it for tracing rays.
 
 pub mod check;
 mod format;
@@ -212,7 +212,7 @@ pub struct Diagnostic {
     pub column: usize,
     /// What is wrong, the value found, and the rule.
     pub message: String,
-    /// Whether all that is wrong is that a file which is named there can't be read.
+    /// Whether the only error is that a file which the scene names can't be read.
     pub unreadable: bool,
 }
 

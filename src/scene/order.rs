@@ -1,8 +1,8 @@
-//! One order for all scenes that mean the same. A file with its tables in another order, or with other names for its materials, gives
-//! the same picture to the last bit, and the same hash.
+//! A canonical order for scenes with the same meaning. Reordering the tables of a file, or renaming its materials, changes
+//! neither the picture's bits nor the hash.
 //!
-//! The order of the file matters only among surfaces of one kind that coincide. So everything is sorted by its numbers first. Then
-//! surfaces that coincide change places among themselves until they are in the order of the file.
+//! Order in the file matters only among surfaces of one kind that coincide. So all surfaces are sorted by their values, and
+//! then each group that coincides is put back into file order.
 
 use super::{Bsdf, Light, Material, Primitive, Scene, Shape};
 use crate::coincidence::COINCIDENT;
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-/// A scene in its one order, with the materials that are in use, each once. The hash and the world are made from it.
+/// A scene in canonical order, with only the materials in use and without duplicates. Hash and world are made from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canonical(Scene);
 
@@ -60,10 +60,10 @@ fn canonical(scene: &Scene) -> Scene {
     s
 }
 
-/// The numbers that describe a thing, as integers in the same order.
+/// The numbers that identify an object, as bits in the same order.
 type Key = [u64; 12];
 
-/// Sorting compares this many numbers of a key first: kind, size and two coordinates, which differ for most things.
+/// How many numbers of a key are stored together for sorting: kind, size and two coordinates distinguish most objects.
 const FIRST: usize = 4;
 
 fn key(numbers: impl IntoIterator<Item = f64>) -> Key {
@@ -348,7 +348,7 @@ impl Grid {
 /// Calls `visit` with all pairs of shapes of one kind whose balls touch, and some more.
 fn for_each_near_pair(shapes: &[Shape], mut visit: impl FnMut(usize, usize)) {
     let grid = Grid::new(shapes);
-    // Most balls have no others near them. Threads find those first; only the rest is visited in order.
+    // Most objects have no near neighbour, which can be checked in parallel.
     let all = (0..shapes.len()).into_par_iter();
     let some_near: Vec<usize> =
         (all.filter(|&k| grid.near(k, |_| ControlFlow::Break(())).is_break())).collect();

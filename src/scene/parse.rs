@@ -21,7 +21,7 @@ pub const MAX_FILE_BYTES: u64 = 64 << 20;
 /// large file of something else can have one error a byte.
 const MAX_RECOVERED_BYTES: usize = 1 << 16;
 
-/// Why there is no scene.
+/// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file is missing, a directory, or can't be read.
@@ -75,7 +75,7 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
     if length > MAX_FILE_BYTES {
         let limit = MAX_FILE_BYTES >> 20;
         return Err(invalid(format!(
-            "is {length} bytes long or longer; a scene file has at most {limit} MiB"
+            "the file has {length} bytes or more; a scene file has at most {limit} MiB"
         )));
     }
 
@@ -85,7 +85,7 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
             let (good, bad) = error.as_bytes().split_at(error.utf8_error().valid_up_to());
             let good = String::from_utf8_lossy(good);
             let message = format!(
-                "byte 0x{:02x} is not UTF-8, but a scene file is UTF-8 text",
+                "byte 0x{:02x} is not valid UTF-8; a scene file is UTF-8 text",
                 bad.first().copied().unwrap_or_default()
             );
             let good = good.strip_prefix('\u{feff}').unwrap_or(&good);
@@ -121,11 +121,11 @@ fn parse(source: Source) -> Result<Scene, Vec<Diagnostic>> {
     }
 }
 
-/// The file as tables; none when it is no TOML.
+/// The file as tables; none if it is not valid TOML.
 fn syntax<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeTable<'a>> {
     let text = source.text();
     if let Some(at) = text.find('\0') {
-        let message = "a NUL character, but a scene file is TOML text".into();
+        let message = "found a NUL character; a scene file is TOML text".into();
         faults.push(Some(at), message);
         return None;
     }
@@ -142,10 +142,10 @@ fn syntax<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeTable<'a>> {
         let found = source.quote(span.clone());
         let message = match error.message() {
             "duplicate key" => format!(
-                "duplicate {}: a key or [table] stands once; only [[tables]] repeat",
+                "duplicate {}: keys and [tables] must be unique; only [[tables]] can repeat",
                 quoted(&found)
             ),
-            // The parser takes whatever is no other value for a string.
+            // The parser treats anything that is not another value as a string.
             message if found.is_empty() && message.starts_with("string values must be quoted") => {
                 "not TOML: a value is missing".into()
             }
@@ -160,7 +160,7 @@ fn syntax<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeTable<'a>> {
 /// The whole scene; none when anything is wrong, which has been reported.
 fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> {
     if root.is_empty() {
-        let message = "is empty; a scene has [camera], a [[light]], and a \
+        let message = "the file is empty; a scene needs [camera], a [[light]], and a \
                        [[sphere]], [[plane]], [[disk]] or [[cylinder]]";
         faults.push(None, message.into());
         return None;
@@ -173,7 +173,7 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
         None => {
             if !root.contains_key("camera") {
                 file.faults
-                    .push(None, "no [camera]: a scene has one".into());
+                    .push(None, "no [camera]; a scene needs one".into());
             }
             None
         }
@@ -195,10 +195,8 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
         }
     }
     if lights.is_empty() && !file.is_wrong("light") {
-        file.faults.push(
-            None,
-            "no [[light]]: a scene has at least one, or it is black".into(),
-        );
+        file.faults
+            .push(None, "no [[light]]; a scene needs at least one".into());
     }
     file.refuse_unknown_keys();
 
@@ -267,7 +265,7 @@ fn materials(file: &mut Reader) -> Vec<Named> {
     materials
 }
 
-/// A key as it stands in a file: bare where it can be.
+/// A key as written in a file: without quotes if possible.
 fn source_name(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if !name.is_empty() && name.chars().all(bare) {
@@ -294,8 +292,8 @@ fn primitives(file: &mut Reader, materials: &[Named]) -> Vec<Option<Primitive>> 
                 && matches!(materials[material].bsdf, Some(Bsdf::Dielectric { .. }))
             {
                 let message = format!(
-                    "material {} is dielectric, but a disk bounds no solid; \
-                     dielectrics may be on spheres, cylinders and planes",
+                    "material {} is dielectric, but a disk is not solid; \
+                     dielectrics are allowed on spheres, cylinders and planes",
                     quoted(&name)
                 );
                 t.refuse("material", message);
@@ -319,14 +317,14 @@ fn primitives(file: &mut Reader, materials: &[Named]) -> Vec<Option<Primitive>> 
     }
     let wrong = ShapeKind::ALL.iter().any(|kind| file.is_wrong(kind.name()));
     if primitives.is_empty() && !wrong {
-        let message = "no primitive: a scene has at least one \
+        let message = "no primitive; a scene needs at least one \
                        [[sphere]], [[plane]], [[disk]] or [[cylinder]]";
         file.faults.push(None, message.into());
     }
     primitives
 }
 
-/// Which of `materials`, ordered by name, it is; an error says what there is instead.
+/// The index of the material with this name; an error lists the names that exist.
 fn find(name: &str, materials: &[Named]) -> Result<usize, String> {
     let found = materials.binary_search_by(|m| m.name.as_str().cmp(name));
     found.map_err(|_| unknown_material(name, materials))

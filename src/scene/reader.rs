@@ -1,5 +1,4 @@
-//! Tables of a scene file, read key by key with the file in hand: what is missing, wrong or unknown is reported with its
-//! place.
+//! Reads the tables of a scene file key by key, and reports missing, invalid and unknown keys with their place.
 
 use super::format::{self, Found, MaterialKind, Need, Table};
 use super::source::{Faults, Source, quoted, suggestion};
@@ -34,7 +33,11 @@ impl Table for Reader<'_, '_> {
         self.known.push(key);
         let Some(found) = self.table.get(key) else {
             if matches!(need, Need::Required) {
-                let message = format!("{} lacks {key}, which must be {}", self.what, T::rule());
+                let message = format!(
+                    "missing key {key} in {}; it must be {}",
+                    self.what,
+                    T::rule()
+                );
                 self.faults.push(self.place(), message);
             }
             return Found::Absent;
@@ -83,7 +86,7 @@ impl<'a, 't> Reader<'a, 't> {
         }
     }
 
-    /// What `read` makes of the file of rows `name`, which lies beside the scene file or where `name` leads from there.
+    /// The result of `read` for the CSV file `name`, a path relative to the scene file.
     pub(super) fn rows<T>(
         &mut self,
         name: &str,
@@ -113,7 +116,7 @@ impl<'a, 't> Reader<'a, 't> {
         self.header.as_ref().map(|h| h.start)
     }
 
-    /// Where the value of `key` stands, or the table that lacks it.
+    /// The place of the value of `key`, or of the table if it has no such key.
     fn place_of(&self, key: &str) -> Option<usize> {
         match self.table.get(key) {
             Some(value) => Some(value.span().start),
@@ -126,7 +129,7 @@ impl<'a, 't> Reader<'a, 't> {
         self.table.get(key).is_some_and(|v| !v.get_ref().is_array())
     }
 
-    /// What `read` finds, and errors for all that it did not ask for.
+    /// The result of `read`, and errors for all keys that it did not read.
     pub(super) fn read_all<T>(&mut self, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
         let value = read(self);
         self.refuse_unknown_keys();
@@ -151,7 +154,7 @@ impl<'a, 't> Reader<'a, 't> {
             )),
             _ => {
                 let found = self.source.quote(value.span());
-                let message = format!("{key} is {found}, but must be one table, {what}");
+                let message = format!("{key} is {found}, but must be a single table {what}");
                 self.faults.push(Some(value.span().start), message);
                 None
             }
@@ -171,7 +174,7 @@ impl<'a, 't> Reader<'a, 't> {
         };
         let what = format!("[[{key}]]");
         let DeValue::Array(items) = value.get_ref() else {
-            let message = format!("{key} must be an array of tables: write {what} for each");
+            let message = format!("{key} must be an array of tables; write {what} for each one");
             self.faults.push(Some(value.span().start), message);
             return Vec::new();
         };

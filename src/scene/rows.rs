@@ -1,7 +1,7 @@
-//! Many spheres or lights from one file of comma-separated rows: `[[spheres]]` and `[[lights]]`.
+//! Reads many spheres or lights from a CSV file: `[[spheres]]` and `[[lights]]`.
 //!
-//! The first row names the columns, in any order; every other row is one thing. Fields are numbers and names of materials:
-//! there is nothing to quote.
+//! The first row names the columns, in any order. Every other row is one object. Fields are numbers and names of materials,
+//! so there are no quotes.
 
 use super::source::{Source, quoted, suggestion};
 use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius};
@@ -30,8 +30,8 @@ pub(super) enum Wrong {
     Content(Vec<Diagnostic>),
 }
 
-/// The spheres in the text of a file, which is named at `place` of the scene file; `material` finds one by name, or says what is
-/// wrong with it, and `common` is that of all if there is no such column.
+/// The spheres in the text of a CSV file, which the scene file names at `place`. `material` finds a material by name or returns
+/// an error. `common` is the material of all spheres if there is no such column.
 pub(super) fn spheres(
     path: &Path,
     text: &str,
@@ -92,7 +92,7 @@ pub(super) fn read(path: &Path) -> Result<String, Wrong> {
         .map_err(system)?;
     if bytes.len() as u64 > MAX_ROWS_BYTES {
         let limit = MAX_ROWS_BYTES >> 20;
-        let message = format!("is larger than a file of rows may be, {limit} MiB");
+        let message = format!("the file is too large; a CSV file has at most {limit} MiB");
         return Err(wrong(Place::default(), message));
     }
     String::from_utf8(bytes).map_err(|e| {
@@ -102,7 +102,7 @@ pub(super) fn read(path: &Path) -> Result<String, Wrong> {
         let byte = bad.first().copied().unwrap_or_default();
         wrong(
             place,
-            format!("byte 0x{byte:02x} is not UTF-8, but a file of rows is UTF-8 text"),
+            format!("byte 0x{byte:02x} is not valid UTF-8; a CSV file is UTF-8 text"),
         )
     })
 }
@@ -146,11 +146,11 @@ impl<'a> Rows<'a> {
     fn header(&mut self, always: &[&str], besides: &[&str]) -> Result<Vec<usize>, Wrong> {
         let wanted = || always.iter().chain(besides).copied();
         let rule = format!(
-            "the first row names the columns {}",
+            "the first row must name the columns {}",
             wanted().collect::<Vec<_>>().join(", ")
         );
         let Some((_, header)) = self.lines.next() else {
-            self.wrong(0, 0, format!("is empty; {rule}"));
+            self.wrong(0, 0, format!("the file is empty; {rule}"));
             return Err(Wrong::Content(std::mem::take(&mut self.errors)));
         };
         let row = Row {
@@ -164,7 +164,7 @@ impl<'a> Rows<'a> {
                 let meant = suggestion(name, wanted());
                 format!("unknown column {}; {rule}{meant}", quoted(name))
             } else if names[..k].contains(name) {
-                format!("a second column {}; {rule}, each once", quoted(name))
+                format!("duplicate column {}; {rule}, each once", quoted(name))
             } else {
                 continue;
             };
@@ -201,7 +201,7 @@ impl<'a> Rows<'a> {
                 self.wrong(
                     i + 1,
                     0,
-                    format!("{fields} fields, but the first row names {count} columns"),
+                    format!("found {fields} fields, but the first row names {count} columns"),
                 );
             } else if let Err((column, message)) = read(row) {
                 self.wrong(i + 1, row.place(column), message);
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_have_their_places() {
+    fn errors_have_their_places() {
         assert_eq!(
             faults("x,y,z,radius,material\n1,2,3,1,red\n1,two,3,1,red\n1,2,3,-1,blue\n"),
             [
@@ -349,8 +349,11 @@ mod tests {
             ["2:10: no blue"]
         );
         let short = faults("x,y,z,radius,material\n0,0,0,1\n");
-        assert_eq!(short, ["2:0: 4 fields, but the first row names 5 columns"]);
-        let rule = "the first row names the columns x, y, z, radius, material";
+        assert_eq!(
+            short,
+            ["2:0: found 4 fields, but the first row names 5 columns"]
+        );
+        let rule = "the first row must name the columns x, y, z, radius, material";
         assert_eq!(
             faults("x,y,z,radios,material\n"),
             [
@@ -361,10 +364,10 @@ mod tests {
         assert_eq!(
             faults("x,y,z,radius,material,radius\n"),
             [format!(
-                "1:23: a second column \"radius\"; {rule}, each once"
+                "1:23: duplicate column \"radius\"; {rule}, each once"
             )]
         );
-        assert_eq!(faults(""), [format!("0:0: is empty; {rule}")]);
+        assert_eq!(faults(""), [format!("0:0: the file is empty; {rule}")]);
         assert_eq!(faults("x,y,z,radius,material\n0,0,0,nan,red\n").len(), 1);
         let dark = "x,y,z,nx,ny,nz,radius,r,g,b\n1,2,3,0,0,0,0.5,9,8,7\n1,2,3,0,inf,1,1,1,1,1\n";
         let Err(Wrong::Content(all)) = lights("x.csv".as_ref(), dark, PLACE) else {
@@ -381,13 +384,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_text_has_its_place() {
+    fn invalid_utf8_has_its_place() {
         let file = tempfile::NamedTempFile::new().expect("a file");
         std::fs::write(file.path(), b"x,y,z,radius,material\n0,0,\xe9,1,red\n").expect("written");
         let Err(Wrong::Content(all)) = read(file.path()) else {
             panic!("no text");
         };
         assert_eq!((all[0].line, all[0].column), (2, 5));
-        assert!(all[0].message.starts_with("byte 0xe9 is not UTF-8"));
+        assert!(all[0].message.starts_with("byte 0xe9 is not valid UTF-8"));
     }
 }

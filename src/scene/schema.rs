@@ -1,17 +1,17 @@
-//! JSON Schema of scene files, for editors: completion, hover texts, and most errors while typing.
+//! JSON Schema of scene files, for completion, hover texts and error checking in editors.
 
 use super::Place;
 use super::format::{self, Found, MaterialKind, Need, ShapeKind, Table};
 use super::value::{Text, Value};
 use serde_json::{Map, Value as Json, json};
 
-/// What `title` is, in schema and hover text.
-pub(super) const TITLE: &str = "What the picture is called.";
+/// The description of `title`.
+pub(super) const TITLE: &str = "Title of the picture.";
 
 /// The schema, draft 7, which TOML editors (Even Better TOML, taplo) understand.
 ///
-/// It says all that concerns one key; what holds between keys (a camera looking along `up`,
-/// diffuse + specular above 1, names of materials) only [`parse`](super::parse) finds.
+/// It covers rules about single keys. Only [`parse`](super::parse) checks rules between keys (a camera looking along `up`,
+/// diffuse + specular above 1, names of materials).
 pub fn schema() -> Json {
     let mut properties = Map::new();
     let mut title = Text::schema();
@@ -19,7 +19,7 @@ pub fn schema() -> Json {
     properties.insert("title".into(), title);
     let camera = describe("The pinhole camera.", format::camera);
     properties.insert("camera".into(), camera);
-    let about = "How the file wants to be rendered; flags override it.";
+    let about = "Render settings. Command-line flags override them.";
     let render = describe(about, format::render);
     properties.insert("render".into(), render);
     properties.insert(
@@ -34,13 +34,13 @@ pub fn schema() -> Json {
         let table = describe(kind.about(), |t| format::primitive(t, kind));
         properties.insert(kind.name().into(), json!({"type": "array", "items": table}));
     }
-    let about = "Spheres from a file of rows.";
+    let about = "Spheres from a CSV file.";
     let table = describe(about, format::spheres);
     properties.insert("spheres".into(), json!({"type": "array", "items": table}));
-    let about = "Lights from a file of rows.";
+    let about = "Lights from a CSV file.";
     let table = describe(about, format::lights);
     properties.insert("lights".into(), json!({"type": "array", "items": table}));
-    let about = "A disk luminaire; reflects nothing.";
+    let about = "A disk light. It reflects nothing.";
     let light = describe(about, |t| format::light(t, Place::default()));
     properties.insert(
         "light".into(),
@@ -53,8 +53,8 @@ pub fn schema() -> Json {
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "etendue scene",
-        "description": "A scene for the path tracer etendue. Lengths share one arbitrary unit, \
-                        angles are degrees, colours and radiances linear RGB (Rec. 709).",
+        "description": "A scene for the path tracer etendue. All lengths have the same arbitrary unit, \
+                        angles are in degrees, colours and radiances are linear RGB (Rec. 709).",
         "type": "object",
         "properties": properties,
         "required": ["camera"],

@@ -1,4 +1,4 @@
-//! Places in the text of a scene file: from byte offsets to line and column, and to short quotes.
+//! Places in the text of a scene file: converts byte offsets to lines, columns and short quotes.
 
 use super::{Diagnostic, Place};
 use std::ops::Range;
@@ -15,7 +15,7 @@ pub(super) struct Source<'a> {
     text: &'a str,
     /// Byte offset of the start of every line.
     lines: Vec<usize>,
-    /// What any file of rows holds that the text names, if that is in memory.
+    /// The text of the CSV file that the scene names, if it is in memory.
     rows: Option<&'a str>,
 }
 

@@ -1,5 +1,4 @@
-//! The kinds of value that scene files hold: each reads itself, states its rule, and describes itself
-//! as JSON Schema.
+//! The kinds of value in scene files. Each kind parses its values, states its rule, and describes itself as JSON Schema.
 
 use glam::DVec3;
 use serde_json::{Value as Json, json};
@@ -7,8 +6,8 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::DeValue;
 
-/// Largest magnitude of coordinates, and of radiance: its square is still a number in f32, which the
-/// kernels calculate in.
+/// Largest magnitude of coordinates, and of radiance: its square is still finite in f32, which the
+/// kernels use.
 pub const LARGEST: f64 = 1e15;
 /// Smallest radius and length: its square is still a normal number in f32.
 pub const SMALLEST: f64 = 1e-15;
@@ -19,7 +18,7 @@ pub const LARGEST_IOR: f64 = 1e6;
 pub const LARGEST_EXPONENT: f64 = 1e15;
 /// Width and height of a picture in pixels.
 pub const LARGEST_RESOLUTION: u32 = 65536;
-/// Strata a side; at 1024 one round already is a million samples a pixel.
+/// Most strata per side: with 1024, one round is already a million samples per pixel.
 pub const LARGEST_STRATA: u32 = 1024;
 
 /// A place in the file that breaks a rule: its span, and the index in the array, if it is in one.
@@ -57,7 +56,7 @@ struct Interval {
     low: f64,
     high: f64,
     open: bool,
-    /// Why there are limits that the quantity itself does not have.
+    /// The reason for limits that the quantity itself does not have.
     why: &'static str,
 }
 

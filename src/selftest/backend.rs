@@ -1,4 +1,4 @@
-//! What the cases run on: an adapter or the CPU reference, as pictures, rays and functions.
+//! The backend of the cases: an adapter or the CPU reference. It renders pictures, traces rays and evaluates functions.
 
 use super::build::Build;
 use super::measure::{Mean, Measure};
@@ -7,7 +7,7 @@ use crate::film::coverage::Rect;
 use crate::film::{BLOCK, Film};
 use crate::gpu::probe::{self, Probe, UNWRITTEN, Values};
 use crate::gpu::{Gpu, GpuEngine, GpuError};
-use crate::kernel::Access;
+use crate::kernel::{Access, ProbeFeatures};
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
 use crate::stats::luminance;
@@ -16,19 +16,19 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// The most paths that a picture takes in search of its precision.
+/// Most paths of a picture that is rendered until its error is small enough.
 const MOST_PATHS: f64 = 3e7;
 
-/// Why a case gave no answer.
+/// Why a case has no result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Trouble {
-    /// The backend refuses what is asked for, or answers with nonsense.
+    /// The backend refuses the scene, or its result is invalid.
     #[error("{0}")]
     Unable(String),
-    /// The device failed; nothing more is to be had of it.
+    /// The device failed and can't be used any more.
     #[error("{0}")]
     Device(String),
-    /// Told to stop.
+    /// `stop` was set.
     #[error("stopped")]
     Stopped,
 }
@@ -166,7 +166,7 @@ impl Backend {
         Picture::to(engine, settings, error, &self.stop)
     }
 
-    /// The same from the CPU reference, whatever this is, by one or the other of its estimators.
+    /// The same on the CPU reference, for every backend, with the given estimator.
     pub(super) fn reference_to(
         &self,
         build: &Build,
@@ -180,10 +180,10 @@ impl Backend {
     }
 
     /// A function of numbers: on an adapter the WGSL statements `body`, which read `x` and write `y`, beside the shader
-    /// modules under `features`; on the reference `twin`. What `inputs` an adapter gets are rounded to f32 first.
+    /// modules; on the reference `twin`. What `inputs` an adapter gets are rounded to f32 first.
     pub(super) fn evaluate(
         &self,
-        (features, body): (&[&'static str], &str),
+        body: &str,
         twin: impl Fn(&Numbers) -> Numbers,
         inputs: &[Numbers],
     ) -> Result<Vec<Numbers>, Trouble> {
@@ -191,7 +191,8 @@ impl Backend {
             return Ok(inputs.iter().map(twin).collect());
         };
         let rounded: Vec<Values> = inputs.iter().map(|x| x.map(|x| x as f32)).collect();
-        let out = probe::run(&open.gpu, features, body, &rounded).map_err(Trouble::Device)?;
+        let out = probe::run(&open.gpu, &ProbeFeatures::default(), body, &rounded)
+            .map_err(Trouble::Device)?;
         written(&out)
     }
 
@@ -211,7 +212,7 @@ impl Backend {
 /// Outputs of a probe as f64; all of them must have been written.
 pub(super) fn written(out: &[Values]) -> Result<Vec<Numbers>, Trouble> {
     if out.iter().any(|y| y[0] == UNWRITTEN) {
-        return Err(Trouble::Unable("an invocation wrote nothing".into()));
+        return Err(Trouble::Unable("an invocation wrote no result".into()));
     }
     Ok(out.iter().map(|y| y.map(f64::from)).collect())
 }
@@ -220,7 +221,7 @@ pub(super) fn written(out: &[Values]) -> Result<Vec<Numbers>, Trouble> {
 pub struct Picture {
     pub film: Film,
     pub counters: Counters,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub spp: u64,
 }
 
@@ -249,7 +250,7 @@ impl Picture {
             if ratio <= 1.0 || spp >= most {
                 return Ok(picture);
             }
-            // A little more than the variance so far asks for, in whole blocks.
+            // A little more than the variance so far requires, in whole blocks.
             let wanted = (spp as f64 * ratio * ratio * 1.05) as u64;
             spp = (wanted.next_multiple_of(BLOCK)).min(most.next_multiple_of(BLOCK));
         }

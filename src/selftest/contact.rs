@@ -1,4 +1,4 @@
-//! Shadow rays that start where things touch, against segments and solids in f64.
+//! Shadow rays from points where solids touch, compared with f64 segments and solids.
 
 use super::backend::{Backend, Trouble};
 use super::build::{Build, cylinder, grey, plane, sphere, v};
@@ -8,7 +8,7 @@ use glam::DVec3;
 
 /// Rays for each scene and light.
 const RAYS: usize = 150_000;
-/// What passes a surface by less is left out: rounding decides.
+/// Rays that pass a surface at a smaller distance are left out, since rounding decides about them.
 const MARGIN: f64 = 1e-5;
 
 /// An upright solid that stands on the floor y = 0.
@@ -113,17 +113,17 @@ pub fn shadows(b: &Backend) -> Result<Vec<Measure>, Trouble> {
             counts.add(&range, &solids, light, &mut dice)?;
         }
         measures.push(Measure::none(
-            format!("{name}: got through of {}", counts.dark),
+            format!("{name}: leaked of {}", counts.dark),
             counts.leaked,
         ));
         measures.push(Measure::none(
             format!("{name}: lost of {}", counts.lit),
             counts.lost,
         ));
-        // A tenth of all at least is of either kind, or the scene would show nothing.
+        // At least a tenth of the rays must be of each kind, or the scene tests nothing.
         let fewest = counts.dark.min(counts.lit) as f64;
         measures.push(Measure::new(
-            format!("{name}: fewer kind of ray"),
+            format!("{name}: fewer rays of a kind"),
             fewest,
             0.1 * RAYS as f64,
             Tolerance::Above,

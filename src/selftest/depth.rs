@@ -14,31 +14,31 @@ pub const CASES: &[Case] = &[
     Case {
         row: "31",
         name: "facing_mirrors",
-        what: "the hundredth image between facing mirrors of 0.99: drift",
+        what: "the 100th image between facing mirrors of reflectance 0.99: drift",
         run: facing_mirrors,
     },
     Case {
         row: "37",
         name: "constant_pixel",
-        what: "a pixel of radiance 0.1, 2²⁴ samples (an adapter makes every thousandth block, all are alike): f32 sums",
+        what: "a pixel of radiance 0.1 with 2²⁴ samples (an adapter renders every 1000th block, since all are equal): f32 sums",
         run: constant_pixel,
     },
     Case {
         row: "38",
         name: "loop_trips",
-        what: "more than 65 535 loop trips, over many samples and in one path: a driver's silent limit",
+        what: "more than 65 535 loop iterations, over many samples and in one path: some drivers silently stop there",
         run: loop_trips,
     },
 ];
 
-/// Facing mirrors one apart, and a light that is met after `images` reflections; every crossing of the gap goes `step`
-/// along.
+/// Facing mirrors at distance 1, and a light that a path reaches after `images` reflections. With each crossing of the gap
+/// the path moves by `step`.
 fn corridor(reflectance: f64, images: u32, step: f64) -> Build {
     let dull = Bsdf::Mirror {
         reflectance: DVec3::splat(reflectance),
     };
     let eye = v(0.5, 0.0, 0.0);
-    // So narrow a view that all of it goes to the same image.
+    // The view is so narrow that all of it shows the same image.
     let vfov = 0.01 * step / f64::from(images);
     Build::new(eye, eye + v(1.0, 0.0, step), vfov)
         .size(8, 8)
@@ -86,8 +86,8 @@ fn constant_pixel(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     )])
 }
 
-/// The film of one pixel after so many blocks of samples. Every thousandth and the last are made, for a submission of so
-/// little costs an adapter a thousand times its work; the film is given their sums for the others, which are the same.
+/// The film of one pixel after many blocks of samples. Only every 1000th block and the last are rendered, since for an adapter
+/// the overhead of such a small submission is 1000 times its work. The other blocks have the same sums.
 fn many_blocks(b: &Backend, build: &Build, blocks: u64) -> Result<Film, Trouble> {
     let settings = build.settings();
     let rect = Rect::whole(settings.size);
@@ -155,8 +155,8 @@ fn loop_trips(b: &Backend) -> Result<Vec<Measure>, Trouble> {
         )),
         // A picture cut short would be the failure. A kernel that counts its trips finds out while it renders.
         Err(Trouble::Unable(why) | Trouble::Device(why)) => measures.push(Measure::none(
-            "70 000 mirrors in one path, refused: other reasons than its loop trips",
-            usize::from(!why.contains("loop trips")),
+            "70 000 mirrors in one path: refused for another reason than its loop iterations",
+            usize::from(!why.contains("loop iterations")),
         )),
         Err(e) => return Err(e),
     }

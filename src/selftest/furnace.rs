@@ -1,5 +1,5 @@
 //! A sphere closed by a disk light. With F = half the height of the cap behind the light, over the radius, every point of
-//! the wall has L = ρ Le F / (1 - ρ (1 - F)), which is Le for ρ = 1: what loses no energy then vanishes.
+//! the wall has L = ρ Le F / (1 - ρ (1 - F)), which is Le for ρ = 1: an object that loses no energy is then invisible.
 
 use super::Case;
 use super::backend::{Backend, Trouble};
@@ -19,13 +19,13 @@ pub const CASES: &[Case] = &[
     Case {
         row: "9",
         name: "eye_in_glass_in_dome",
-        what: "an eye in a glass ball, nearer its centre than R/n: radiance grows by n²",
+        what: "an eye in a glass ball, closer to its centre than R/n: radiance grows by n²",
         run: eye_in_glass,
     },
     Case {
         row: "16",
         name: "touching_glass_in_dome",
-        what: "two glass balls that touch, a ball that touches a plane: surfaces that coincide",
+        what: "two touching glass balls, and a ball touching a plane: coinciding surfaces",
         run: touching_glass,
     },
     Case {
@@ -43,13 +43,13 @@ pub const CASES: &[Case] = &[
     Case {
         row: "19",
         name: "furnace_of_long_paths",
-        what: "walls of 0.999, a light that fills a hundredth of their view: roulette and depth limit",
+        what: "walls of reflectance 0.999, and a light that fills 1 % of their view: roulette and depth limit",
         run: long_paths,
     },
     Case {
         row: "32",
         name: "touching_mirrors_in_dome",
-        what: "two mirror balls that touch in the white dome: chaotic paths",
+        what: "two touching mirror balls in the white dome: chaotic paths",
         run: touching_mirrors,
     },
 ];
@@ -188,20 +188,21 @@ fn chord(b: &Backend) -> Result<Vec<Measure>, Trouble> {
 fn long_paths(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     let build = furnace(0.999, 0.98);
     let expected = 0.909_01;
-    // A path has a hundred vertices here, and half the tolerance is all that is paid for. The reference is too slow for
-    // that many light samples; chance alone has a tenth of their variance here, where every path ends on the light.
+    // A path has a hundred vertices here, so the error only falls to half the tolerance. The reference is too slow for
+    // that many light samples. Without light sampling its variance is ten times smaller here, since every path ends on the
+    // light.
     let error = 0.98e-3 * expected;
     let (picture, how) = if b.open_gpu().is_some() {
         (b.picture_to(&build, &build.settings(), error)?, "radiance")
     } else {
         let chance = Estimator::NoLightSampling;
         let picture = b.reference_to(&build, &build.settings(), chance, error)?;
-        (picture, "radiance by chance alone")
+        (picture, "radiance without light sampling")
     };
     Ok(vec![
         Measure::sampled(how, picture.mean(), expected, Tolerance::Relative(2e-3)),
         Measure::none(
-            "paths cut at the depth limit",
+            "paths truncated at the depth limit",
             picture.counters.truncated as usize,
         ),
     ])

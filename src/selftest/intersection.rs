@@ -1,4 +1,4 @@
-//! Spheres far away, at their edge and from inside, and what a ray meets that leaves a primitive.
+//! Spheres far away, at their edge and from inside, and rays that leave a primitive.
 
 use super::Case;
 use super::backend::{Backend, Trouble};
@@ -27,13 +27,13 @@ pub const CASES: &[Case] = &[
     Case {
         row: "5",
         name: "tangent_rays",
-        what: "rays that miss a sphere's centre by r(1 - k 2⁻²⁰): the end of a square root",
+        what: "rays that miss a sphere's centre by r(1 - k 2⁻²⁰): a square root near 0",
         run: tangent_rays,
     },
     Case {
         row: "7",
         name: "glancing_chords",
-        what: "chords inside a sphere, down to grazing: a ray meets what it stands on",
+        what: "chords inside a sphere, down to grazing: a ray hits the surface that it starts on",
         run: glancing_chords,
     },
     Case {
@@ -167,7 +167,7 @@ fn tangent_rays(b: &Backend) -> Result<Vec<Measure>, Trouble> {
             reversals,
         ));
         measures.push(Measure::none(
-            format!("{name}: answers that are not finite"),
+            format!("{name}: results that are not finite"),
             broken,
         ));
         // k >= 0 in each of the five; the tangent itself may go either way, and obliquely its neighbour.

@@ -1,4 +1,4 @@
-//! Scenes that must look the same: built of huge spheres instead of planes, moved, in another order, on other machines.
+//! Scenes that must look the same: with huge spheres instead of planes, moved, in another order, on another backend.
 
 use super::Case;
 use super::backend::{Backend, Picture, Trouble};
@@ -14,7 +14,7 @@ pub const CASES: &[Case] = &[
     Case {
         row: "1",
         name: "walls_of_radius_1e5",
-        what: "a box of spheres of radius 10⁵ against one of planes: cancellation",
+        what: "a box made of spheres of radius 10⁵, compared with one made of planes: cancellation",
         run: |b| huge_walls(b, 1e5),
     },
     Case {
@@ -32,18 +32,18 @@ pub const CASES: &[Case] = &[
     Case {
         row: "42",
         name: "another_order",
-        what: "primitives and lights in another order: ties, choice of lights",
+        what: "primitives and lights in another file order: ties, choice of lights",
         run: another_order,
     },
     Case {
         row: "43",
         name: "another_device",
-        what: "against the CPU reference (or that against its other estimator): rounding",
+        what: "compared with the CPU reference (or that with its other estimator): rounding",
         run: another_device,
     },
 ];
 
-/// What the standard error of each of two pictures may be, of their mean, that their difference be known to 10⁻³.
+/// Largest relative standard error of each of two pictures, so that their difference is known to 10⁻³.
 const EACH: f64 = 0.65e-3;
 
 /// The six walls of the cube |x|, |y|, |z| <= 1, with their inward normals.
@@ -232,22 +232,21 @@ fn another_order(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     let other = pairs.filter(|(a, b)| a != b).count() + partial.filter(|(a, b)| a != b).count();
     Ok(vec![
         Measure::none("against file order: pixels with other bits", other),
-        Measure::new(
-            "pixels that are lit",
-            a.lit_pixels() as f64,
-            0.0,
-            Tolerance::Above,
-        ),
+        Measure::new("lit pixels", a.lit_pixels() as f64, 0.0, Tolerance::Above),
     ])
 }
 
 fn another_device(b: &Backend) -> Result<Vec<Measure>, Trouble> {
-    // Chance alone needs a light that is easily found.
+    // Without light sampling the light must be easy to hit.
     let (what, estimator, build) = if b.open_gpu().is_some() {
         ("against the reference", Estimator::LightSampling, room())
     } else {
         let flat = cornell(|n| plane(-n, n));
-        ("against chance alone", Estimator::NoLightSampling, flat)
+        (
+            "against no light sampling",
+            Estimator::NoLightSampling,
+            flat,
+        )
     };
     let settings = build.settings();
     let error = EACH * approximate_mean(b, &build, &settings)?;

@@ -31,13 +31,13 @@ pub const CASES: &[Case] = &[
     Case {
         row: "L1",
         name: "leaving_a_surface",
-        what: "rays that leave primitives of size 10⁻³ to 10⁵, up to 10⁴ from the origin, meet none wrongly",
+        what: "rays that leave primitives of size 10⁻³ to 10⁵, up to 10⁴ from the origin: false hits",
         run: leaving::rays_that_leave,
     },
     Case {
         row: "L2",
         name: "shadows_at_contact",
-        what: "shadow rays from where things touch: none gets through, none is lost",
+        what: "shadow rays from points where solids touch: leaks and false hits",
         run: contact::shadows,
     },
 ];
@@ -141,14 +141,14 @@ fn outside_a_box(b: &Backend) -> Result<Vec<Measure>, Trouble> {
         let picture = b.picture(&room, &room.depth(40), 64)?;
         rays += picture.counters.rays;
         measures.push(Measure::none(
-            format!("{name}: pixels that are lit"),
+            format!("{name}: lit pixels"),
             picture.lit_pixels(),
         ));
         if b.open_gpu().is_some() {
-            // White walls leave roulette nothing to do, so only a path that got out ends before its time.
+            // Roulette ends no path between white walls, so a path that ends early has escaped.
             let out = picture.counters.paths - picture.counters.truncated;
             measures.push(Measure::none(
-                format!("{name}: paths that got out"),
+                format!("{name}: paths that escaped"),
                 out as usize,
             ));
         }
@@ -169,7 +169,7 @@ fn inside_a_cylinder(b: &Backend) -> Result<Vec<Measure>, Trouble> {
         .light(v(1.15, 0.7, 0.2), v(0.5, 0.4, -0.2), 0.2995, 1e6);
     let picture = b.picture(&build, &build.depth(8), 512)?;
     Ok(vec![
-        Measure::none("pixels outside that are lit", picture.lit_pixels()),
+        Measure::none("lit pixels outside", picture.lit_pixels()),
         Measure::new("rays", picture.counters.rays as f64, 1e6, Tolerance::Above),
     ])
 }

@@ -25,7 +25,7 @@ const KINDS: [(&str, bool); 7] = [
     ("disk", false),
 ];
 
-/// Leaves outwards, and through what is transparent inwards, and counts what is met wrongly.
+/// Shoots rays outwards, and inwards through transparent primitives, and counts the wrong hits.
 pub fn rays_that_leave(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     let mut measures = Vec::new();
     let mut total = 0;

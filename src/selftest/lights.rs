@@ -99,7 +99,7 @@ fn samples(b: &Backend, points: &[[f64; 2]], [a, h, r]: [f64; 3]) -> Result<Vec<
         }
         y
     };
-    b.evaluate((&["LIGHT_SAMPLING"], LIGHT), twin, &inputs)
+    b.evaluate(LIGHT, twin, &inputs)
 }
 
 /// An even spread of points in the unit square (Hammersley).
@@ -216,7 +216,7 @@ fn receiver_in_plane(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     let picture = b.picture(&build, &settings, 64)?;
     let mut between = 0;
     picture.film.for_each(|_, _, e| {
-        // Only the light itself is to be seen: a pixel is at most 1, and its floor part 0.
+        // Only the light itself is visible: a pixel is at most 1, and its floor part 0.
         between += usize::from(!(0.0..=1.0 + 1e-6).contains(&e.mean[0]));
     });
     let dark = Build::new(v(0.0, 0.5, 5.0), v(4.0, 0.0, 0.0), 20.0)
@@ -226,11 +226,8 @@ fn receiver_in_plane(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     Ok(vec![
         Measure::none(format!("not finite of {count} samples"), broken),
         Measure::none(format!("not refused of {count} samples"), sampled),
-        Measure::none("pixels of a lit floor beyond the light's radiance", between),
-        Measure::none(
-            "pixels of the floor beside it that are lit",
-            dark.lit_pixels(),
-        ),
+        Measure::none("pixels of a lit floor brighter than the light", between),
+        Measure::none("lit pixels of the floor beside it", dark.lit_pixels()),
     ])
 }
 

@@ -1,15 +1,15 @@
-//! What a case has measured, what it should have, and whether that will do.
+//! A measured quantity, its expected value, and the tolerance.
 
 use statrs::function::erf::{erfc, erfc_inv};
 use std::fmt;
 
-/// Standard errors that a mean may be off.
+/// Allowed deviation of a mean, in standard errors.
 const SIGMAS: f64 = 4.0;
 
-/// The most that a standard error may be for [`Tolerance::Sigmas`], of the expected value: else the run shows nothing.
+/// Largest relative standard error for [`Tolerance::Sigmas`]: with a larger one the run would test nothing.
 pub const PRECISION: f64 = 1e-3;
 
-/// What the rounding of f32 sums and of a few hundred f32 factors may add to a standard error, of the expected value.
+/// Added to a standard error, relative to the expected value: rounding of f32 sums and of a few hundred f32 factors.
 const ROUNDING: f64 = 1e-5;
 
 /// A mean of random samples and its standard error.
@@ -28,10 +28,10 @@ pub enum Tolerance {
     Exact,
     /// By this much.
     Absolute(f64),
-    /// By this share of what is expected; a standard error, if there is one, must be half of it or less.
+    /// By this fraction of the expected value; a standard error must be at most half of it.
     Relative(f64),
-    /// By four standard errors, or by as many as are as rare among `comparisons` as four are alone; a standard error must
-    /// be 10⁻³ of what is expected or less.
+    /// By four standard errors, or more for several `comparisons`, so that the false-alarm rate is the same. A standard
+    /// error must be at most 10⁻³ of the expected value.
     Sigmas {
         /// How many quantities are looked at together.
         comparisons: usize,
@@ -87,12 +87,12 @@ impl Measure {
         }
     }
 
-    /// A number of mistakes, of which there may be none.
+    /// A number of errors, which must be 0.
     pub fn none(quantity: impl Into<String>, mistakes: usize) -> Self {
         Self::new(quantity, mistakes as f64, 0.0, Tolerance::Exact)
     }
 
-    /// Two means that should be one.
+    /// Two means that should be equal.
     pub fn same(quantity: impl Into<String>, a: Mean, b: Mean) -> Self {
         let difference = Mean {
             mean: a.mean,
@@ -120,14 +120,14 @@ impl Measure {
                 },
             );
         Self::new(
-            format!("{quantity}: farthest of {}, in σ", pairs.len()),
+            format!("{quantity}: largest deviation of {}, in σ", pairs.len()),
             worst,
             sigmas(pairs.len()),
             Tolerance::Below,
         )
     }
 
-    /// Whether it will do. What is not a number never will.
+    /// Whether the quantity is within the tolerance. NaN never is.
     pub fn passed(&self) -> bool {
         let off = (self.measured - self.expected).abs();
         let error = self.error.unwrap_or(0.0);
@@ -190,8 +190,8 @@ fn digits(x: f64) -> String {
     }
 }
 
-/// Standard errors that the farthest of `comparisons` normal deviates exceeds as rarely as a single one exceeds
-/// [`SIGMAS`] (Bonferroni).
+/// The number of standard errors that the largest of `comparisons` normal deviates exceeds as rarely as a single one
+/// exceeds [`SIGMAS`] (Bonferroni).
 fn sigmas(comparisons: usize) -> f64 {
     let rare = erfc(SIGMAS / std::f64::consts::SQRT_2);
     erfc_inv(rare / comparisons as f64) * std::f64::consts::SQRT_2
@@ -271,14 +271,14 @@ mod tests {
     }
 
     #[test]
-    fn many_comparisons_may_stray_farther() {
+    fn many_comparisons_allow_larger_deviations() {
         assert!((sigmas(1) - 4.0).abs() < 1e-9);
         // By Python's statistics.NormalDist: 6.334e-5 / 1000, two-sided, is 5.4091 standard deviations.
         assert!((sigmas(1000) - 5.4091).abs() < 1e-4, "{}", sigmas(1000));
     }
 
     #[test]
-    fn the_farthest_of_several_counts_and_nan_is_far() {
+    fn the_largest_deviation_counts_and_nan_fails() {
         let mean = |mean| Mean { mean, error: 1e-3 };
         let far = Measure::farthest("", &[(mean(1.0), 1.0), (mean(1.005), 1.0)]);
         assert!(

@@ -1,7 +1,7 @@
-//! The hard cases: scenes, rays and functions whose answer is known, run on an adapter or on the CPU reference.
+//! The hard cases: scenes, rays and functions with known answers, run on an adapter or on the CPU reference.
 //!
-//! Every expected value is a closed form or a published number; none is computed by what is under test. Rows 1 to 43
-//! are those of the project's table of hard cases; L1 and L2 are about rays that leave and touch surfaces.
+//! Every expected value is a closed form or a published number; none is computed by the code under test. Rows 1 to 43
+//! are those of the project's table of hard cases; L1 and L2 test rays that leave and touch surfaces.
 
 mod backend;
 pub mod build;
@@ -37,7 +37,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// Runs it. One that measures nothing would always pass, so that is a failure.
+    /// Runs the case. A case without measures would always pass, so it is an error.
     ///
     /// # Errors
     /// When the backend refuses a scene, fails, or is stopped.

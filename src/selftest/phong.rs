@@ -16,7 +16,7 @@ pub const CASES: &[Case] = &[
     Case {
         row: "33",
         name: "phong_furnace",
-        what: "albedo for ks = 1 under an even sky, n = 0 to 1000: pow(0, 0), lobes that are cut off",
+        what: "albedo for ks = 1 under a uniform sky, n = 0 to 1000: pow(0, 0), truncated lobes",
         run: furnace,
     },
     Case {
@@ -28,7 +28,7 @@ pub const CASES: &[Case] = &[
     Case {
         row: "35",
         name: "phong_reciprocity",
-        what: "f(ωi, ωo) against f(ωo, ωi): asymmetry of rounding",
+        what: "f(ωi, ωo) compared with f(ωo, ωi): asymmetric rounding",
         run: reciprocity,
     },
 ];
@@ -94,7 +94,7 @@ fn grazing(b: &Backend, n: f64) -> Result<Measure, Trouble> {
         y[0] = sample.map_or(0.0, |(_, weight, _)| weight.x);
         y
     };
-    let out = b.evaluate((&["PHONG", "DIFFUSE"], body), twin, &inputs)?;
+    let out = b.evaluate(body, twin, &inputs)?;
     let mean = out.iter().map(|y| y[0]).sum::<f64>() / out.len() as f64;
     let ratio = (ln_gamma((n + 1.0) / 2.0) - ln_gamma(n / 2.0 + 2.0)).exp();
     let expected = (n + 2.0) / (4.0 * PI.sqrt()) * ratio;
@@ -167,7 +167,7 @@ fn reciprocity(b: &Backend) -> Result<Vec<Measure>, Trouble> {
                 inputs.push(x);
             }
         }
-        let out = b.evaluate((&["PHONG", "MIRROR", "DIFFUSE"], body), twin, &inputs)?;
+        let out = b.evaluate(body, twin, &inputs)?;
         let asymmetry = |y: &Numbers| (y[0] - y[1]).abs() / y[0].max(y[1]);
         // A maximum would pass over what is not a number.
         let worst =

@@ -1,4 +1,4 @@
-//! Chosen rays through a scene, by the very functions that paths use.
+//! Traces single rays through a scene, with the same functions that paths use.
 
 use super::backend::{Backend, Numbers, OpenGpu, Trouble, written};
 use super::build::Build;
@@ -51,7 +51,7 @@ impl Shot {
     }
 }
 
-/// What a shot has met.
+/// The hit of a ray.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Landing {
     /// Number of the surface, lights first; `None` for nothing.
@@ -141,14 +141,14 @@ impl<'a> Range<'a> {
     /// Number of the first surface whose primitive is as `wanted` says.
     ///
     /// # Panics
-    /// If there is none: the case's own scene lacks what it is about.
+    /// If there is none, since the case's scene is then wrong.
     pub fn number(&self, wanted: impl Fn(&crate::world::WorldPrimitive) -> bool) -> usize {
         let world = self.world();
         let index = world.primitives.iter().position(wanted);
         world.lights.len() + index.expect("the scene has it")
     }
 
-    /// What the shots meet, in their order.
+    /// The hits of the shots, in the same order.
     pub fn shoot(&self, shots: &[Shot]) -> Result<Vec<Landing>, Trouble> {
         self.backend.check_stop()?;
         match self.backend.open_gpu() {

@@ -1,4 +1,4 @@
-//! Every sampler at the ends of its random numbers.
+//! Every sampler with its smallest and largest random numbers.
 
 use super::Case;
 use super::backend::{Backend, Numbers, Trouble};
@@ -13,7 +13,7 @@ use glam::DVec3;
 pub const CASES: &[Case] = &[Case {
     row: "39",
     name: "sampler_end_points",
-    what: "every sampler at random numbers 0, 2⁻²⁴ and 1 - 2⁻²⁴: end points",
+    what: "every sampler at the random numbers 0, 2⁻²⁴ and 1 - 2⁻²⁴: end points",
     run: end_points,
 }];
 
@@ -73,7 +73,7 @@ fn uniform(b: &Backend) -> Result<Measure, Trouble> {
     let body = "
         let u = unit_float(vec4u(0u, 255u, 0xffffff00u, 0xffffffffu));
         y[0] = select(-1.0, 1.0, all(u >= vec4f(0.0)) && all(u < vec4f(1.0)));";
-    let out = b.evaluate((&[], body), |_| numbers(Some(vec![1.0])), &[[0.0; 16]])?;
+    let out = b.evaluate(body, |_| numbers(Some(vec![1.0])), &[[0.0; 16]])?;
     Ok(measure("random numbers below 1", &out))
 }
 
@@ -105,7 +105,7 @@ fn cosine(b: &Backend) -> Result<Measure, Trouble> {
     let rest: Vec<_> = normals().iter().map(|n| n.to_array().to_vec()).collect();
     Ok(measure(
         "cosine-distributed direction",
-        &b.evaluate((&["DIFFUSE"], &body), twin, &inputs(&rest))?,
+        &b.evaluate(&body, twin, &inputs(&rest))?,
     ))
 }
 
@@ -148,7 +148,7 @@ fn lobe(b: &Backend) -> Result<Measure, Trouble> {
     }
     Ok(measure(
         "direction in a lobe",
-        &b.evaluate((&["PHONG", "DIFFUSE"], &body), twin, &inputs(&rest))?,
+        &b.evaluate(&body, twin, &inputs(&rest))?,
     ))
 }
 
@@ -190,7 +190,7 @@ fn cap(b: &Backend) -> Result<Measure, Trouble> {
     }
     Ok(measure(
         "point on a light",
-        &b.evaluate((&["LIGHT_SAMPLING"], &body), twin, &inputs(&rest))?,
+        &b.evaluate(&body, twin, &inputs(&rest))?,
     ))
 }
 

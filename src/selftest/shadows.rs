@@ -1,4 +1,4 @@
-//! What a light's back and a ball hide.
+//! Shadows of a light's back and of a ball.
 
 use super::Case;
 use super::backend::{Backend, Trouble};
@@ -11,7 +11,7 @@ pub const CASES: &[Case] = &[
     Case {
         row: "24",
         name: "behind_a_light",
-        what: "the dark side of a light, which blocks all the same: sign",
+        what: "the dark side of a light, which also casts shadows: sign",
         run: behind_a_light,
     },
     Case {
@@ -23,7 +23,7 @@ pub const CASES: &[Case] = &[
 ];
 
 fn behind_a_light(b: &Backend) -> Result<Vec<Measure>, Trouble> {
-    // Something bright beyond the black back; and a thing, for there is no scene without, where nobody sees it.
+    // Something bright behind the black back, and an invisible primitive, since a scene needs one.
     let facing = |side: f64| {
         Build::new(v(0.0, 0.0, 3.0 * side), DVec3::ZERO, 5.0)
             .add(sphere(v(0.0, 9.0, 0.0), 1.0), grey(0.5))

@@ -19,13 +19,13 @@ pub const CASES: &[Case] = &[
     Case {
         row: "29",
         name: "almost_along_the_axis",
-        what: "10⁻⁴ rad off the axis in a tube 2·10⁴ radii long: division by A",
+        what: "rays 10⁻⁴ rad off the axis in a tube 2·10⁴ radii long: division by A",
         run: almost_along_the_axis,
     },
     Case {
         row: "30",
         name: "tube_from_inside",
-        what: "chords of a cylinder from its side: a ray meets what it stands on",
+        what: "chords of a cylinder from its side: a ray hits the surface that it starts on",
         run: from_inside,
     },
 ];

@@ -1,13 +1,13 @@
-//! How heavy the tail of positive numbers is, and whether their mean can be trusted.
+//! Measures how heavy the tail of positive numbers is, and whether their mean is reliable.
 //!
-//! Beyond a high threshold almost every distribution is near a generalised Pareto distribution, whose shape k says which
-//! moments exist: the mean for k < 1, the variance for k < 1/2. From k = 1/2 on the mean of a sample has no standard error, and
-//! falls short of the true mean more often than not: what makes up for it is rare, and large.
+//! Beyond a high threshold almost every distribution is close to a generalised Pareto distribution. Its shape k decides which
+//! moments exist: the mean for k < 1, the variance for k < 1/2. From k = 1/2 on, the mean of a sample has no standard error. It
+//! is usually below the true mean, since the numbers that would raise it are rare and large.
 
-/// The part of the numbers, the largest, of which [`Tail::top_share`] tells.
+/// The fraction of largest numbers that [`Tail::top_share`] adds up.
 const TOP: f64 = 1e-3;
 
-/// Exceedances that carry a smaller share of the sum are no tail worth the name: equal numbers, but for rounding.
+/// If the exceedances are a smaller fraction of the sum, there is no tail: the numbers are equal up to rounding.
 const NEGLIGIBLE: f64 = 1e-3;
 
 /// The smallest tail that a shape is fitted to.
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_tail_is_told_apart() {
+    fn samples_without_a_tail_are_recognised() {
         assert_eq!(tail(&mut [1.0; 50]), None);
         assert_eq!(tail(&mut vec![0.0; 10_000]), None);
         let same = tail(&mut vec![2.0; 10_000]).unwrap();

@@ -16,12 +16,16 @@
 
 mod faces;
 mod geometry;
+pub(crate) mod light_tree;
 mod media;
+pub(crate) mod near_light;
 mod origin;
 pub mod trace;
 mod tree;
+pub(crate) mod visibility;
 
 pub use geometry::Geometry;
+pub use light_tree::MOST_LOOKED_AT;
 pub use tree::{Bounds, Node, Tree};
 
 pub use crate::coincidence::COINCIDENT;
@@ -221,6 +225,18 @@ impl World {
             indices: media.indices(),
             light_scales: shines_in.is_none().then_some(scales),
         }
+    }
+
+    /// How many lights and primitives there are.
+    pub fn surface_count(&self) -> usize {
+        self.lights.len() + self.primitives.len()
+    }
+
+    /// The primitive with this number among lights and primitives; `None` for a light.
+    pub(crate) fn primitive(&self, number: usize) -> Option<&WorldPrimitive> {
+        number
+            .checked_sub(self.lights.len())
+            .map(|i| &self.primitives[i])
     }
 }
 

@@ -27,7 +27,7 @@ fn keys(value: &Value) -> BTreeSet<&str> {
 }
 
 #[test]
-fn bench_refuses_what_it_cannot_do() {
+fn bench_refuses_invalid_arguments() {
     let bench = Bench::new();
     bench.run("bench").code(2).stderr(says("SCENE"));
     for (args, rule) in [
@@ -41,7 +41,7 @@ fn bench_refuses_what_it_cannot_do() {
         ("box.toml --engine cpu --adapter x", "--adapter"),
         (
             "box.toml box.toml --engine cpu --reference a.exr",
-            "2 scenes",
+            "needs a single scene, found 2",
         ),
         (
             "box.toml --reference a.exr --reference-spp 4",
@@ -90,16 +90,16 @@ fn bench_refuses_what_it_cannot_do() {
 }
 
 #[test]
-fn a_reference_of_something_else_is_refused() {
+fn a_reference_of_another_scene_is_refused() {
     let bench = Bench::new();
     bench.render("--spp 16 --size 12x8 -o small.exr -o small.png");
     bench.render("--spp 16 -o box.exr");
     bench.render("--spp 16 --light direct -o direct.exr");
     bench.render("--spp 16 --region 0,0,4,4 -o part.exr");
     for (name, rule) in [
-        ("small.exr", "12 x 8 pixels, the picture 24 x 16"),
+        ("small.exr", "12 x 8 pixels, but the picture has 24 x 16"),
         ("small.png", ".exr or a film"),
-        ("direct.exr", "another scene or other settings"),
+        ("direct.exr", "another scene or has other settings"),
         ("part.exr", "whole picture"),
         ("box.toml", "box.toml"),
     ] {
@@ -112,12 +112,12 @@ fn a_reference_of_something_else_is_refused() {
     bench
         .run("bench box.toml --engine cpu --reference box.exr --max-spp 1 --seeds 1 --time 1ms --progress none")
         .success()
-        .stdout(says("reference: box.exr, 16 samples a pixel").and(says("cpu")))
+        .stdout(says("reference: box.exr, 16 samples per pixel").and(says("cpu")))
         .stderr("");
 }
 
 #[test]
-fn json_lines_carry_what_was_measured() {
+fn json_lines_contain_all_measurements() {
     let bench = Bench::new();
     let done = bench.run(&format!("{SMALL} --json -")).success();
     let output = done.get_output();
@@ -192,7 +192,7 @@ fn json_lines_carry_what_was_measured() {
 }
 
 #[test]
-fn the_reference_is_kept_and_goes_on() {
+fn the_reference_is_cached_and_resumed() {
     let bench = Bench::new();
     let reference = |args: &str| {
         let done = bench.run(&format!("{SMALL} --json - {args}")).success();
@@ -210,25 +210,25 @@ fn the_reference_is_kept_and_goes_on() {
     );
     assert_eq!(fs::read(&file).unwrap(), bytes, "it was not touched");
 
-    // A shorter one is there already; a longer one goes on from it; other settings have another.
+    // A shorter reference is in the cache already. A longer one resumes it. Other settings have their own.
     let shorter = bench
         .run(&SMALL.replace("--reference-spp 64", "--reference-spp 32"))
         .success();
-    shorter.stdout(says("64 samples a pixel").and(says("kept in cache")));
+    shorter.stdout(says("64 samples per pixel").and(says("cached in cache")));
     bench
         .run(&SMALL.replace("--reference-spp 64", "--reference-spp 128"))
         .success()
-        .stdout(says("128 samples a pixel"));
+        .stdout(says("128 samples per pixel"));
     assert_eq!(film().coverage.samples(), (128, 128));
     assert_ne!(reference("--light direct")["file"], first["file"]);
     assert_ne!(reference("--strata 3")["file"], first["file"]);
 
-    // What is damaged is made anew, and said.
+    // A damaged reference is rendered again, with a warning.
     fs::write(&file, "no film").unwrap();
     bench
         .run(SMALL)
         .success()
-        .stderr(says("warning: ").and(says("made anew")));
+        .stderr(says("warning: ").and(says("the reference is rendered again")));
     assert_eq!(film(), made, "the same samples again");
 }
 
@@ -263,7 +263,7 @@ fn the_report_table_leaves_blank_what_takes_too_long() {
     for cell in cells {
         let rays = cell["rays"].as_u64().unwrap();
         assert_eq!(cell["samples"], 4 * rays);
-        // The first is rendered whatever it takes; 256 rays never fit into a millisecond.
+        // The first count is always rendered; 256 rays never fit into a millisecond.
         assert!(rays != 1 || cell["seconds"].as_f64().unwrap() > 0.0);
         assert!(rays != 256 || cell["seconds"].is_null());
     }
@@ -280,7 +280,7 @@ fn scaling_shows_the_cost_of_a_path_by_number() {
         .stdout(
             says("spheres: 8x6, 3 other surfaces")
                 .and(says("lights: 8x6, 24 other surfaces"))
-                .and(says("ns a path")),
+                .and(says("ns per path")),
         );
     let lines = json_lines(&fs::read(bench.path("a.jsonl")).unwrap());
     let expected = [
@@ -328,13 +328,13 @@ fn scaling_shows_the_cost_of_a_path_by_number() {
         }
     }
     let svg = fs::read_to_string(bench.path("a.svg")).unwrap();
-    assert!(svg.contains("cpu-brute") && svg.contains("nanoseconds a path"));
+    assert!(svg.contains("cpu-brute") && svg.contains("nanoseconds per path"));
     let png = fs::read(bench.path("a.png")).unwrap();
     assert!(png.starts_with(b"\x89PNG"));
 }
 
 #[test]
-fn an_interrupted_scaling_shows_what_there_is() {
+fn an_interrupted_scaling_prints_its_results_so_far() {
     let bench = Bench::new();
     let script = "timeout --foreground --preserve-status -s INT 3 \"$0\" bench --scaling --engine cpu --size 8x6 \
                   --time 10s --up-to 300 --json a.jsonl --progress none > table";
@@ -347,7 +347,7 @@ fn an_interrupted_scaling_shows_what_there_is() {
 }
 
 #[test]
-fn an_interrupted_bench_shows_what_there_is() {
+fn an_interrupted_bench_prints_its_results_so_far() {
     let bench = Bench::new();
     let script = "timeout --foreground --preserve-status -s INT 4 \"$0\" bench box.toml --engine cpu --seeds 2 --size 12x8 \
                   --time 1h --reference-spp 64 --cache cache --json a.jsonl --progress none > table";

@@ -64,7 +64,7 @@ fn regions_have_the_bits_of_the_whole() {
 }
 
 #[test]
-fn a_film_gone_on_with_has_the_bits_of_one_run() {
+fn a_resumed_film_has_the_bits_of_one_run() {
     let bench = Bench::new();
     bench.render("--spp 50 --film cut.npz -o a.png --seed 3");
     // The seed comes from the film.
@@ -83,7 +83,7 @@ fn a_film_gone_on_with_has_the_bits_of_one_run() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupted_film_goes_on_with_the_same_bits() {
+fn an_interrupted_film_is_resumed_with_the_same_bits() {
     let bench = Bench::new();
     interrupted(&bench, "-INT");
     let held = bench.film("f.npz").coverage.samples().1;
@@ -123,7 +123,7 @@ fn slices_merge_to_the_single_run_in_any_order() {
 }
 
 #[test]
-fn merge_names_what_does_not_fit() {
+fn merge_names_films_that_do_not_fit() {
     let bench = Bench::new();
     bench.render("--samples 0..8 --film a.npz -o a.png");
     bench.render("--samples 4..12 --film b.npz -o a.png");
@@ -145,11 +145,11 @@ fn merge_names_what_does_not_fit() {
     bench
         .run("merge out.npz a.npz c.npz")
         .code(4)
-        .stderr(says("never replaced"));
+        .stderr(says("merge never overwrites a film"));
 }
 
 #[test]
-fn a_film_of_something_else_is_refused_and_untouched() {
+fn a_film_of_another_scene_is_refused_and_untouched() {
     let bench = Bench::new();
     bench.render("--spp 4 --film f.npz -o a.png");
     let before = fs::read(bench.path("f.npz")).unwrap();
@@ -184,7 +184,7 @@ fn a_film_of_something_else_is_refused_and_untouched() {
 }
 
 #[test]
-fn a_film_of_a_part_takes_no_other_part() {
+fn a_film_of_a_region_refuses_other_regions() {
     let bench = Bench::new();
     bench.render("--spp 4 --region 0,0,8,8 --film f.npz -o a.png");
     bench
@@ -210,7 +210,7 @@ fn a_damaged_film_is_refused() {
 }
 
 #[test]
-fn nothing_is_written_beside_what_was_asked_for() {
+fn only_the_requested_files_are_written() {
     let bench = Bench::new();
     bench.render("--spp 1 -o only.png");
     assert_eq!(bench.names(), ["box.toml", "only.png"]);

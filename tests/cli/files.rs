@@ -26,8 +26,8 @@ fn refused(bench: &Bench, commands: &[(&str, &str)]) {
     }
 }
 
-const LOST: &str = "which would be lost; name another file";
-const TWICE: &str = "one would replace the other; name two files";
+const LOST: &str = " would overwrite ";
+const TWICE: &str = "are the same file; name two different files";
 
 /// A scene with both kinds of rows, `rows.toml`.
 fn with_rows(bench: &Bench) {
@@ -40,7 +40,7 @@ fn with_rows(bench: &Bench) {
 }
 
 #[test]
-fn render_spares_its_scene() {
+fn render_never_overwrites_its_scene() {
     let bench = Bench::new();
     with_rows(&bench);
     fs::copy(bench.path("box.toml"), bench.path("x.png")).unwrap();
@@ -58,9 +58,9 @@ fn render_spares_its_scene() {
         // By default.
         (
             cpu("x.png"),
-            "the picture (--output names another) x.png: that is the scene, which",
+            "the default picture (--output changes it) x.png would overwrite the scene",
         ),
-        (cpu("x.exr"), "x.exr: that is the scene, which"),
+        (cpu("x.exr"), "x.exr would overwrite the scene"),
     ];
     let commands: Vec<(&str, &str)> = commands.iter().map(|(c, t)| (c.as_str(), *t)).collect();
     refused(&bench, &commands);
@@ -71,14 +71,14 @@ fn render_spares_its_scene() {
             &bench,
             &[(
                 &cpu("x.png -o link.png"),
-                "link.png: that is the scene x.png, which",
+                "link.png would overwrite the scene x.png",
             )],
         );
     }
 }
 
 #[test]
-fn no_two_outputs_are_one() {
+fn two_outputs_are_never_the_same_file() {
     let bench = Bench::new();
     bench.render("--spp 1 --film f.npz -o f.png");
     fs::create_dir(bench.path("sub")).unwrap();
@@ -95,13 +95,13 @@ fn no_two_outputs_are_one() {
     ];
     let commands: Vec<(&str, &str)> = commands.iter().map(|c| (c.as_str(), TWICE)).collect();
     refused(&bench, &commands);
-    // A film is gone on with.
+    // An existing film is resumed.
     bench.render("--spp 2 --film f.npz -o a.png --report r.json --dump-wgsl k.wgsl --watch w.png");
     assert_eq!(bench.film("f.npz").coverage.samples(), (2, 2));
 }
 
 #[test]
-fn films_and_pictures_that_are_read_stay() {
+fn inputs_are_never_overwritten() {
     let bench = Bench::new();
     bench.render("--spp 8 --film f.npz -o a.exr");
     fs::copy(bench.path("f.npz"), bench.path("film.png")).unwrap();
@@ -116,7 +116,7 @@ fn films_and_pictures_that_are_read_stay() {
             ("compare a.exr b.exr --html ./b.exr", LOST),
             (
                 "compare a.exr b.exr --html -",
-                "--html -: this goes to a file",
+                "--html can't be written to stdout",
             ),
             ("develop film.png -o film.png", LOST),
             ("develop f.npz -o c.png -o ./c.png", TWICE),
@@ -144,15 +144,15 @@ fn films_and_pictures_that_are_read_stay() {
             ("regress . --backend cpu --html r --junit r", TWICE),
             (
                 "regress . --backend cpu --html -",
-                "--html -: this goes to a file",
+                "--html can't be written to stdout",
             ),
             (
                 "make-scene spheres --count 1000 -o y.csv",
-                "a scene's name ends in .toml",
+                "the name of a scene must end in .toml",
             ),
             (
                 "make-scene lights --count 3 -o y",
-                "a scene's name ends in .toml",
+                "the name of a scene must end in .toml",
             ),
             ("merge x.png f.npz", "its name ends in .npz"),
             (
@@ -164,7 +164,7 @@ fn films_and_pictures_that_are_read_stay() {
 }
 
 #[test]
-fn text_goes_to_stdout_by_the_same_name_everywhere() {
+fn a_dash_means_stdout_for_every_text_output() {
     let bench = Bench::new();
     bench
         .run("render box.toml --backend cpu --spp 1 -o a.png --dump-wgsl - --quiet")
@@ -188,12 +188,12 @@ fn films_of_other_names() {
     bench
         .run("compare a.exr f")
         .success()
-        .stdout(says("the same"));
+        .stdout(says("equal up to noise"));
 }
 
 #[cfg(unix)]
 #[test]
-fn a_write_protected_film_is_not_gone_on_with() {
+fn a_read_only_film_is_not_resumed() {
     use std::os::unix::fs::PermissionsExt;
     let bench = Bench::new();
     bench.render("--spp 1 --film f.npz -o a.png");
@@ -202,7 +202,7 @@ fn a_write_protected_film_is_not_gone_on_with() {
     bench
         .run("render box.toml --backend cpu --spp 4 --film f.npz -o a.png")
         .code(4)
-        .stderr("error: f.npz: cannot write: the film is write-protected\n");
+        .stderr("error: f.npz: cannot write the film: it is read-only\n");
     assert!(fs::read(bench.path("f.npz")).unwrap() == before);
     bench.run("develop f.npz -o b.png").success();
 }

@@ -1,4 +1,4 @@
-//! The program from outside: exit statuses, what is written where, and the promises about bits.
+//! Runs the program: exit statuses, output files, and bit-identical results.
 //!
 //! Everything runs on the CPU reference, so that these tests need no adapter.
 

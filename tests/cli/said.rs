@@ -1,4 +1,4 @@
-//! What is said, and where.
+//! Messages and help, on stdout and stderr.
 
 use crate::program::{Bench, says};
 use predicates::prelude::*;
@@ -40,7 +40,7 @@ fn every_command_has_examples_and_even_lines() {
             .filter(|l| l.starts_with(char::is_alphanumeric))
             .collect();
         for pair in prose.windows(2) {
-            // A line that goes on in the next one is full.
+            // A wrapped line must be full.
             let [line, next] = [pair[0], pair[1]];
             let word = next.split(' ').next().unwrap_or_default();
             let goes_on =
@@ -94,7 +94,7 @@ fn the_report_on_stdout_has_every_key() {
 
 #[cfg(unix)]
 #[test]
-fn a_reader_that_has_gone_is_no_failure() {
+fn a_closed_pipe_is_not_an_error() {
     use std::process::{Command, Stdio};
     let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
         .arg("schema")
@@ -169,7 +169,7 @@ fn samples_are_means() {
 }
 
 #[test]
-fn lines_of_progress_never_say_all_is_done() {
+fn progress_lines_never_say_100_percent() {
     let bench = Bench::new();
     bench
         .run("render box.toml --backend cpu --spp 64 --progress plain -o a.png")
@@ -178,19 +178,19 @@ fn lines_of_progress_never_say_all_is_done() {
 }
 
 #[test]
-fn a_picture_to_follow_is_left_as_the_last_one() {
+fn the_watch_picture_is_the_final_one_at_the_end() {
     let bench = Bench::new();
     bench.render("--spp 4 -o a.png --watch w.png");
     let (a, w) = (fs::read(bench.path("a.png")), fs::read(bench.path("w.png")));
     assert_eq!(a.unwrap(), w.unwrap());
 }
 
-/// On a terminal a stage that takes long is named until it ends; elsewhere, and where no bar is wanted, none is.
+/// On a terminal, long stages are shown until they end. They are not shown elsewhere, or without a progress bar.
 #[cfg(target_os = "linux")]
 #[test]
-fn long_stages_are_named_on_a_terminal_alone() {
+fn long_stages_are_shown_only_on_a_terminal() {
     let bench = Bench::new();
-    // A scene that comes slowly, whatever the machine.
+    // A scene that is slow to read on every machine.
     let script = r#"
         export TERM=xterm
         render() {
@@ -210,7 +210,7 @@ fn long_stages_are_named_on_a_terminal_alone() {
     let bar = said("bar");
     let (stage, after) = bar.rsplit_once("reading bar.toml, ").expect(&bar);
     assert!(stage.contains("reading bar.toml, 0."), "{bar:?}");
-    // Cleared before anything else is said.
+    // Cleared before anything else is printed.
     let (rest, said_next) = after.split_once("bar.toml: 24x16").expect(&bar);
     assert!(
         rest.contains("\x1b[2K") && said_next.contains("wrote"),

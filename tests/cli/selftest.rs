@@ -4,7 +4,7 @@ use crate::program::{Bench, says};
 use predicates::prelude::*;
 
 #[test]
-fn selftest_prints_what_it_measured_and_its_verdict() {
+fn selftest_prints_measurements_and_verdict() {
     let bench = Bench::new();
     bench
         .run("selftest --backend cpu --filter incidence --quiet")
@@ -27,7 +27,7 @@ fn selftest_prints_what_it_measured_and_its_verdict() {
 }
 
 #[test]
-fn selftest_refuses_what_it_cannot_do() {
+fn selftest_refuses_invalid_arguments() {
     let bench = Bench::new();
     bench
         .run("selftest --backend cpu --filter nonsense")

@@ -12,7 +12,7 @@ fn status_0_and_the_default_outputs() {
         .run("render box.toml --backend cpu --spp 1")
         .success()
         .stdout("")
-        .stderr(says("24x16").and(says("until 1 sample a pixel")))
+        .stderr(says("24x16").and(says("until 1 sample per pixel")))
         .stderr(says("wrote box.exr, box.png"));
     assert_eq!(bench.names(), ["box.exr", "box.png", "box.toml"]);
 }
@@ -21,7 +21,7 @@ fn status_0_and_the_default_outputs() {
 fn status_2_for_a_bad_command_line() {
     let bench = Bench::new();
     for (flags, rule) in [
-        ("--spp 0", "whole number, 1 to"),
+        ("--spp 0", "whole number from 1 to"),
         ("--spp many", "many"),
         ("--rays 4294967295", "4294967295"),
         ("--time 5x", "90s, 2m, 1h30m"),
@@ -32,7 +32,7 @@ fn status_2_for_a_bad_command_line() {
         ("--samples 0..4 --spp 3", "cannot be used with"),
         ("--samples 0..4 --error 1%", "cannot be used with"),
         ("--size 0x4", "1 to 65536"),
-        ("--region 1,1,1,2", "half-open"),
+        ("--region 1,1,1,2", "X0 must be less than X1"),
         ("--region 0,0,25,16", "24x16"),
         ("--light direct,dim", "\"dim\""),
         ("--max-depth 0", "a whole number from 1 to 4294967295"),
@@ -44,7 +44,7 @@ fn status_2_for_a_bad_command_line() {
         ("--adapter x", "--backend cpu"),
         ("--checkpoint 5s", "--film"),
         ("--exposure x", "stops"),
-        ("--output a.tiff", ".exr and .png"),
+        ("--output a.tiff", "use .exr or .png"),
         ("--output a", ".exr or .png"),
         ("--watch a.exr", ".png"),
         ("--no-such-flag", "--no-such-flag"),
@@ -110,9 +110,9 @@ fn status_2_for_a_picture_larger_than_memory() {
     }
 }
 
-/// What begins with a hyphen is told the rule, not that there is no such flag.
+/// The error for a value that begins with a hyphen states the rule, not that the flag is unknown.
 #[test]
-fn negative_values_are_told_the_rule() {
+fn negative_values_get_the_rule() {
     let bench = Bench::new();
     for (command, flag, value, rule) in [
         (
@@ -123,10 +123,15 @@ fn negative_values_are_told_the_rule() {
         ),
         ("render box.toml", "--size", "-1x5", "1 to 65536"),
         ("render box.toml", "--time", "-1s", "90s, 2m, 1h30m"),
-        ("render box.toml", "--region", "-1,0,4,4", "whole pixels"),
+        (
+            "render box.toml",
+            "--region",
+            "-1,0,4,4",
+            "expected X0,Y0,X1,Y1 in pixels",
+        ),
         ("render box.toml", "--exposure", "-inf", "from -100 to 100"),
         ("render box.toml", "--exposure", "-101", "from -100 to 100"),
-        ("render box.toml", "--spp", "-1", "a whole number, 1 to"),
+        ("render box.toml", "--spp", "-1", "a whole number from 1 to"),
         ("render box.toml", "--error", "-1%", "more than 0"),
         (
             "render box.toml",
@@ -187,7 +192,12 @@ fn negative_values_are_told_the_rule() {
             "-1",
             "a whole number from 1 to 5000000",
         ),
-        ("bench box.toml", "--max-spp", "-1", "a whole number, 1 to"),
+        (
+            "bench box.toml",
+            "--max-spp",
+            "-1",
+            "a whole number from 1 to",
+        ),
     ] {
         let text = format!("error: invalid value '{value}' for '{flag} <");
         bench
@@ -196,12 +206,12 @@ fn negative_values_are_told_the_rule() {
             .stdout("")
             .stderr(says(&text).and(says(rule)).and(says("tip:").not()));
     }
-    // The value's own sign is no matter where it may have one.
+    // Negative values are accepted where they are valid.
     bench.render("--spp 1 --exposure -2 -o a.png");
 }
 
 #[test]
-fn status_4_for_files_that_cannot_be_had() {
+fn status_4_for_inaccessible_files() {
     let bench = Bench::new();
     fs::create_dir(bench.path("folder")).unwrap();
     for (args, name) in [
@@ -249,7 +259,7 @@ fn status_4_for_files_that_cannot_be_had() {
 
 /// The scene is all right, but for files that it names.
 #[test]
-fn status_4_for_files_of_rows_that_cannot_be_had() {
+fn status_4_for_inaccessible_csv_files() {
     let bench = Bench::new();
     fs::create_dir(bench.path("folder")).unwrap();
     let with = |file: &str| {
@@ -307,9 +317,9 @@ pub fn interrupted(bench: &Bench, signal: &str) -> Option<i32> {
 
 #[cfg(unix)]
 #[test]
-fn status_130_143_and_129_after_saving_what_there_is() {
+fn status_130_143_and_129_after_saving_the_results_so_far() {
     let mut signals = vec![("-INT", 130), ("-TERM", 143)];
-    // Hanging up is caught where the system tells that it is not to be ignored: not under nohup, here and in what is run.
+    // SIGHUP is handled unless the process ignores it, as under nohup. Then the child ignores it too.
     let ignored = fs::read_to_string("/proc/self/status").ok().and_then(|s| {
         let mask = s.lines().find_map(|l| l.strip_prefix("SigIgn:"))?.trim();
         Some(u64::from_str_radix(mask, 16).ok()? & 1 == 1)

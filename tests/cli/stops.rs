@@ -3,7 +3,7 @@
 use crate::program::{Bench, says};
 
 #[test]
-fn rays_are_for_every_stratum() {
+fn rays_count_per_stratum() {
     let bench = Bench::new();
     bench.render("--rays 2 --strata 3 -o a.exr");
     assert_eq!(bench.picture("a.exr").samples.unwrap()[0], 18);
@@ -29,7 +29,7 @@ fn time_and_error_end_a_run() {
 
 /// An error that no run reaches leaves the other conditions as they are.
 #[test]
-fn time_holds_whatever_the_error() {
+fn time_ends_a_run_for_every_error() {
     let bench = Bench::new();
     for error in ["1e-8", "1e-20", "1e-100", "1e-320"] {
         bench

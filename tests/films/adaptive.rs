@@ -1,18 +1,18 @@
-//! `--adaptive` from outside: gone on with bit for bit, refused where it does not fit, merged.
+//! `--adaptive` on the command line: films are resumed bit for bit, merged, and refused if they don't fit.
 
 use crate::program::{Bench, says};
 
 const RENDER: &str = "render box.toml --backend cpu --size 64x48 --adaptive -o a.exr";
 
 #[test]
-fn a_film_is_gone_on_with_bit_for_bit_and_its_counts_differ() {
+fn adaptive_films_are_resumed_bit_for_bit_and_their_counts_differ() {
     let bench = Bench::new();
     bench
         .run(&format!(
             "{RENDER} --spp 90 --film once.npz --report r.json"
         ))
         .success()
-        .stderr(says("90.0 samples a pixel on average"));
+        .stderr(says("90.0 samples per pixel on average"));
     let report = std::fs::read_to_string(bench.path("r.json")).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
     let spp = report["spp"].as_f64().expect("a number");
@@ -46,7 +46,7 @@ fn a_film_is_gone_on_with_bit_for_bit_and_its_counts_differ() {
 }
 
 #[test]
-fn what_does_not_go_together_is_refused() {
+fn conflicting_arguments_are_refused() {
     let bench = Bench::new();
     let plain = RENDER.replace(" --adaptive", "");
     bench
@@ -58,15 +58,15 @@ fn what_does_not_go_together_is_refused() {
     for (command, text) in [
         (
             format!("{plain} --spp 80 --film f.npz"),
-            "made with --adaptive",
+            "this film is adaptive: resume it with --adaptive",
         ),
         (
             format!("{RENDER} --spp 80 --film g.npz"),
-            "made without --adaptive",
+            "this film is not adaptive: resume it without --adaptive",
         ),
         (
             format!("{RENDER} --spp 80 --film f.npz --region 0,0,9,9"),
-            "adaptive film of other regions",
+            "adaptive film has other regions",
         ),
         (format!("{RENDER} --samples 0..9"), "cannot be used with"),
     ] {
@@ -75,7 +75,7 @@ fn what_does_not_go_together_is_refused() {
 }
 
 #[test]
-fn regions_merge_and_the_sum_goes_on_evenly() {
+fn merged_regions_are_resumed_without_adaptive() {
     let bench = Bench::new();
     for (name, region) in [("a", "0,0,64,24"), ("b", "0,24,64,48")] {
         bench

@@ -1,5 +1,5 @@
-//! What is no film, or none any more, to every command that reads films: an error that says what is wrong, exit status
-//! 2 or 4, and nothing touched. The loader's own tests (`film_store.rs`) go through the ways more thoroughly.
+//! Damaged films, and files that are not films, in every command that reads films. Each must give a clear error, exit status
+//! 2 or 4, and leave the file unchanged. `film_store.rs` tests more kinds of damage.
 
 use crate::output_support::{forge, negate_first_count};
 use crate::program::{Bench, NAMESPACE, says};
@@ -37,14 +37,14 @@ fn damaged_films_are_refused_and_left_as_they_are() {
         (edited(&|b| b.truncate(b.len() / 2)), "truncated"),
         (edited(&|b| b.truncate(b.len() - 1)), "truncated"),
         (Vec::new(), "not a film: it is empty"),
-        (edited(&|b| b.push(0)), "bytes after its end"),
+        (edited(&|b| b.push(0)), "extra bytes at the end"),
         (edited(&|b| b[20_000] ^= 4), "does not match its checksum"),
         (png, "not a film: it is a PNG picture"),
-        (scene, "not a film: it is no NumPy archive"),
+        (scene, "not a film: it is not a NumPy archive"),
         (with_a_nan(&bench), "\"sums\" holds NaN"),
         (
             edited(&|b| negate_first_count(b, 4)),
-            "counts 18446744073709551615 samples",
+            "has a count of 18446744073709551615 samples",
         ),
         (
             edited(&|b| forge(b, "\"format_version\":1", "\"format_version\":2")),
@@ -98,7 +98,7 @@ fn with_a_nan(bench: &Bench) -> Vec<u8> {
 }
 
 #[test]
-fn films_that_cannot_be_had_are_named() {
+fn inaccessible_films_are_named() {
     let (bench, _) = two_films();
     fs::remove_file(bench.path("f.npz")).expect("removed");
     for command in &READERS[1..] {
@@ -120,7 +120,7 @@ fn films_that_cannot_be_had_are_named() {
 /// As root, who may write everywhere, the folder is a read-only mount.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_film_in_a_read_only_folder_is_read_and_not_gone_on_with() {
+fn a_film_in_a_read_only_folder_is_read_but_not_resumed() {
     let (bench, before) = two_films();
     let mount = "mkdir -p ro && cp f.npz ro/ && chmod 555 ro && if touch ro/x 2>/dev/null; then rm ro/x; \
                  mount --bind ro ro && mount -o remount,bind,ro ro || exit 77; fi;";

@@ -62,7 +62,7 @@ fn killed_at_random(backend: &str, kills: usize, most: Duration, after_a_save: b
     let path = bench.path("f.npz");
     let mut random = Random(7);
     let mut held = 0;
-    // How old the film was when the process that had written it was killed: what was lost.
+    // The age of the film when its process was killed, which is the time lost.
     let mut lost = Vec::new();
     for _ in 0..kills {
         let started = SystemTime::now();
@@ -105,7 +105,7 @@ fn killed_at_random(backend: &str, kills: usize, most: Duration, after_a_save: b
     lost.sort();
     let median = lost.get(lost.len() / 2);
     println!(
-        "{backend}: {held} samples a pixel; {} of {kills} had saved: lost {median:?}, at most {:?}",
+        "{backend}: {held} samples per pixel; {} of {kills} had saved: lost {median:?}, at most {:?}",
         lost.len(),
         lost.last()
     );
@@ -128,7 +128,7 @@ fn killed_at_random(backend: &str, kills: usize, most: Duration, after_a_save: b
 }
 
 #[test]
-fn a_hundred_kills_leave_a_whole_film_that_ends_with_the_same_bits() {
+fn a_film_killed_a_hundred_times_ends_with_the_same_bits() {
     killed_at_random("cpu", 100, Duration::from_millis(500), false);
 }
 
@@ -138,8 +138,7 @@ fn kills_on_the_adapter_end_with_the_same_bits() {
     killed_at_random("gpu", 10, Duration::from_millis(500), true);
 }
 
-/// A film of a large picture with a sample of nothing in every pixel, as `render box.toml --size 1200x900` would go on
-/// with.
+/// A film of a large picture with one black sample per pixel, which `render box.toml --size 1200x900` would resume.
 fn large_film(path: &Path) -> Film {
     let size = [1200, 900];
     let scene = parse::parse_str(Path::new("box.toml"), SCENE).expect("a scene");
@@ -157,10 +156,10 @@ fn large_film(path: &Path) -> Film {
     film
 }
 
-/// A stalled disk as it looks from outside: the process stands still in the midst of a save (SIGSTOP when part of the
-/// new film is there), for as long as one likes, and never goes on.
+/// Simulates a stalled disk: stops the process during a save (SIGSTOP when part of the new film is written), and never
+/// continues it.
 #[test]
-fn a_write_that_stalls_for_ever_costs_only_what_it_was_to_save() {
+fn a_stalled_write_loses_only_its_own_samples() {
     let bench = Bench::new();
     let path = bench.path("f.npz");
     let film = large_film(&path);
@@ -207,7 +206,7 @@ fn a_write_that_stalls_for_ever_costs_only_what_it_was_to_save() {
     assert!(leftovers(&bench).is_empty());
 }
 
-/// A film of 10 samples, and the command that goes on with it at `PATH`.
+/// A film of 10 samples, and the command that resumes it at `PATH`.
 fn small_film(bench: &Bench) -> Vec<u8> {
     bench.render("--spp 10 --film f.npz -o a.png");
     fs::read(bench.path("f.npz")).expect("the film")

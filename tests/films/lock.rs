@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 #[test]
-fn the_second_process_is_refused_and_a_killed_one_is_not_in_the_way() {
+fn a_second_process_is_refused_but_not_after_a_kill() {
     let bench = Bench::new();
     let args = "render box.toml --backend cpu --quiet -o a.png --checkpoint 100ms --film";
     let mut first = Command::new(env!("CARGO_BIN_EXE_etendue"))

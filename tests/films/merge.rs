@@ -41,13 +41,13 @@ fn the_pair_that_overlaps_is_named_unless_one_is_damaged() {
     bench.render("--samples 8..16 --film b.npz -o a.png");
     bench.render("--samples 12..20 --region 3,4,9,9 --film c.npz -o a.png");
     bench.run("merge out.npz a.npz b.npz c.npz").code(2).stderr(says(
-        "error: c.npz: cannot be added to b.npz: samples 12..16 of pixels 3,4,9,9 are in both films",
+        "error: c.npz: cannot be merged with b.npz: samples 12..16 of pixels 3,4,9,9 are in both films",
     ));
     bench
         .run("merge out.npz a.npz b.npz a.npz")
         .code(2)
-        .stderr(says("a.npz: cannot be added to a.npz"));
-    // What is damaged is said first: its coverage may be wrong, too.
+        .stderr(says("a.npz: cannot be merged with a.npz"));
+    // Damage is reported first, since the coverage of a damaged film may be wrong too.
     let bytes = fs::read(bench.path("b.npz")).expect("a film");
     fs::write(bench.path("b.npz"), &bytes[..bytes.len() / 2]).expect("written");
     bench
@@ -71,7 +71,7 @@ fn a_foreign_scene_is_named() {
         .run("render other.toml --backend cpu --samples 8..16 --film b.npz -o a.png")
         .success();
     bench.run("merge out.npz a.npz b.npz").code(2).stderr(
-        says("b.npz: cannot be added to a.npz: scene is \"Test box\" (").and(says(") and ")),
+        says("b.npz: cannot be merged with a.npz: scene is \"Test box\" (").and(says(") and ")),
     );
 }
 

@@ -10,7 +10,7 @@ fn parse(line: &str) -> Option<(f64, f64, &str)> {
 }
 
 #[test]
-fn lines_tell_samples_error_and_what_is_left_and_never_100_per_cent() {
+fn progress_lines_have_samples_error_and_time_left() {
     let bench = Bench::new();
     let done = bench
         .run("render box.toml --backend cpu --progress plain --time 11s --error 0.0001% -o a.png")

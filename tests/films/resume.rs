@@ -1,4 +1,4 @@
-//! Going on with a film: what is refused, what is not, and what NumPy finds in it.
+//! Resuming a film: which films are refused or accepted, and what NumPy reads from them.
 
 use crate::output_support::seen_from_python;
 use crate::program::{Bench, SCENE, says};
@@ -66,12 +66,12 @@ fn everything_that_differs_is_named() {
 }
 
 #[test]
-fn another_adapter_goes_on_with_a_note() {
+fn resuming_on_another_adapter_prints_a_note() {
     let bench = Bench::new();
     film_with(&bench, |p| {
         p.devices[0].device.name = "Another adapter".into();
     });
-    let text = "note: f.npz holds samples made on Another adapter";
+    let text = "note: f.npz holds samples from Another adapter";
     bench.run(GO_ON).success().stderr(says(text));
     let (film, provenance) = store::load(&bench.path("f.npz")).expect("a film");
     assert_eq!(film.coverage.samples(), (8, 8));
@@ -96,7 +96,7 @@ fn another_adapter_goes_on_with_a_note() {
 }
 
 #[test]
-fn numpy_finds_what_is_promised() {
+fn numpy_reads_the_documented_arrays() {
     let bench = Bench::new();
     bench.render("--size 12x8 --spp 300 --seed 5 --film f.npz -o a.exr");
     let Some(seen) = seen_from_python(&bench.path("f.npz")) else {

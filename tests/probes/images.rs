@@ -1,7 +1,8 @@
 //! Where a mirror ball shows a light.
 
-use super::{Numbers, probe, vector};
+use super::{Numbers, probe_with, vector};
 use etendue::gpu::probe::{Uniform, Values};
+use etendue::kernel::ProbeFeatures;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -50,8 +51,12 @@ fn images_in_mirror_balls() {
             cos_light.abs(),
         )
     };
+    let features = ProbeFeatures {
+        images: true,
+        ..ProbeFeatures::default()
+    };
     let mut found = 0;
-    for (x, y) in inputs.iter().zip(probe(&["IMAGES"], body, &inputs)) {
+    for (x, y) in inputs.iter().zip(probe_with(&features, body, &inputs)) {
         assert!(y[0].is_finite() && y[0] >= 0.0, "{x:?} {y:?}");
         let (o, d) = (vector(x, 0), vector(&y, 1).normalize());
         let (center, normal, radius) = (vector(x, 3), vector(x, 6), f64::from(x[9]));

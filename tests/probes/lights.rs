@@ -1,7 +1,8 @@
 //! Points of disk lights: where they lie, with which density, and one of two by what a lobe scatters.
 
-use super::{Numbers, probe, vector};
+use super::{Numbers, probe, probe_with, vector};
 use etendue::gpu::probe::{Uniform, Values};
+use etendue::kernel::ProbeFeatures;
 use etendue::reference::light;
 use etendue::world::WorldLight;
 use glam::DVec3;
@@ -52,10 +53,7 @@ fn cap_samples_lie_on_the_disk_with_the_density_they_state() {
         light_text()
     );
     let mut compared = 0;
-    for (x, y) in inputs
-        .iter()
-        .zip(probe(&["LIGHT_SAMPLING"], &body, &inputs))
-    {
+    for (x, y) in inputs.iter().zip(probe(&body, &inputs)) {
         let (p, d) = (vector(x, 0), vector(&y, 2));
         let height = l.normal.dot(p) - l.offset;
         if height < 1e-4 {
@@ -134,18 +132,18 @@ fn suited_samples_make_the_integrals_of_all_samples() {
          var g = vec3f(0.0);
          var second = 0.0;
          for (var i = 0u; i < 64u; i++) {{
-             let s = sample_suited(light, cap, at, u, (f32(i) + x[14]) / 64.0);
-             g += vec3f(1.0, scattered(at, s.to.d, 1.0, 0.0), s.to.distance) * fmax(dot(at.n, s.to.d), 0.0) * (s.to.inverse_pdf * s.worth / 64.0);
-             second += select(0.0, 1.0, dot(s.to.d, plain.d) < 0.999999);
+             let s = sample_light(light, cap, at, u, (f32(i) + x[14]) / 64.0);
+             g += vec3f(1.0, scattered(at, s.d, 1.0, 0.0), s.distance) * fmax(dot(at.n, s.d), 0.0) * (s.inverse_pdf * s.worth / 64.0);
+             second += select(0.0, 1.0, dot(s.d, plain.d) < 0.999999);
          }}
          y[0] = f.x; y[1] = f.y; y[2] = f.z; y[3] = g.x; y[4] = g.y; y[5] = g.z; y[6] = second;",
         light_text()
     );
-    let out = probe(
-        &["LIGHT_SAMPLING", "LIGHT_WEIGHTS", "GLOSSY"],
-        &body,
-        &inputs,
-    );
+    let glossy = ProbeFeatures {
+        glossy: true,
+        ..ProbeFeatures::default()
+    };
+    let out = probe_with(&glossy, &body, &inputs);
     let mut others = 0.0;
     for (place, cells) in places.iter().zip(out.chunks(CELLS * CELLS)) {
         let sum = |k: usize| -> f64 { cells.iter().map(|y| f64::from(y[k])).sum() };

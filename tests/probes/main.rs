@@ -7,6 +7,7 @@ mod lights;
 
 use etendue::gpu::probe::{UNWRITTEN, Uniform, Values, run};
 use etendue::gpu::{Choice, Gpu};
+use etendue::kernel::ProbeFeatures;
 use etendue::world::trace::dielectric;
 use glam::DVec3;
 use std::sync::LazyLock;
@@ -17,7 +18,11 @@ static GPU: LazyLock<Gpu> = LazyLock::new(|| {
     gpu
 });
 
-fn probe(features: &[&'static str], body: &str, inputs: &[Values]) -> Vec<Values> {
+fn probe(body: &str, inputs: &[Values]) -> Vec<Values> {
+    probe_with(&ProbeFeatures::default(), body, inputs)
+}
+
+fn probe_with(features: &ProbeFeatures, body: &str, inputs: &[Values]) -> Vec<Values> {
     let out = run(&GPU, features, body, inputs).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(out.len(), inputs.len());
     assert!(
@@ -85,10 +90,7 @@ fn spheres_are_met_where_f64_meets_them() {
          let c = sphere_inside(Hit(FAR, NONE), ray, s, 9u, 1u); y[2] = c.t;"
     );
     let (mut hits, mut inside) = (0, 0);
-    for (x, y) in inputs
-        .iter()
-        .zip(probe(&["SPHERE", "ROUND"], &body, &inputs))
-    {
+    for (x, y) in inputs.iter().zip(probe(&body, &inputs)) {
         let (o, d) = (vector(x, 0), vector(x, 3));
         let center = DVec3::new(0.3f32.into(), (-0.2f32).into(), 0.1f32.into());
         let r = f64::from(0.7f32);
@@ -137,10 +139,7 @@ fn cylinders_are_met_where_f64_meets_them() {
          let b = cylinder_inside(Hit(FAR, NONE), ray, c, 4u, 5u, 6u, 4u); y[2] = b.t; y[3] = f32(b.key & 3u);"
     );
     let mut seen = [0; 6];
-    for (x, y) in inputs
-        .iter()
-        .zip(probe(&["CYLINDER", "FLAT", "ROUND"], &body, &inputs))
-    {
+    for (x, y) in inputs.iter().zip(probe(&body, &inputs)) {
         let (o, d) = (vector(x, 0), vector(x, 3));
         // Textbook: all crossings with side and caps, in f64.
         let r = f64::from(0.6f32);
@@ -214,7 +213,7 @@ fn fresnel_is_that_of_f64() {
         })
         .collect();
     let body = "let f = refraction(x[0], x[1]); y[0] = f.transmitted; y[1] = f.cos_t;";
-    for (x, y) in inputs.iter().zip(probe(&["DIELECTRIC"], body, &inputs)) {
+    for (x, y) in inputs.iter().zip(probe(body, &inputs)) {
         let expected = dielectric::fresnel(x[0].into(), x[1].into()).transmittance;
         // At the critical angle transmission rises like a square root: compare in its square there.
         let (a, b) = (f64::from(y[0]), expected);
@@ -248,7 +247,7 @@ fn phong_power_keeps_its_digits() {
             })
             .collect();
         let body = "y[0] = phong_power(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), x[6]);";
-        for (x, y) in inputs.iter().zip(probe(&["PHONG"], body, &inputs)) {
+        for (x, y) in inputs.iter().zip(probe(body, &inputs)) {
             // The inputs are rounded to f32: the f64 twin starts from the same.
             let half = (vector(x, 0) - vector(x, 3)).length_squared() / 2.0;
             let expected = (f64::from(exponent) * (-half).ln_1p()).exp();
@@ -291,9 +290,9 @@ fn random_numbers_are_even_in_pairs() {
         })
         .collect();
     let body = "let d = draw(vec4u(u32(x[0]), u32(x[1]), u32(x[2]), 7u));
-        y[0] = d.points.x; y[1] = d.points.y; y[2] = d.points.z; y[3] = d.points.w;
-        y[4] = d.choices.x; y[5] = d.choices.y; y[6] = d.choices.z; y[7] = d.choices.w;";
-    let out = probe(&[], body, &inputs);
+        y[0] = d.light_point.x; y[1] = d.light_point.y; y[2] = d.direction.x; y[3] = d.direction.y;
+        y[4] = d.light; y[5] = d.lobe; y[6] = d.roulette; y[7] = d.spare;";
+    let out = probe(body, &inputs);
     for a in 0..8 {
         for b in 0..a {
             let mut counts = vec![0u32; 32 * 32];
@@ -330,7 +329,7 @@ fn directions_follow_their_densities() {
             "{frame}{sample} y[0] = dot(d, a); y[1] = dot(d, b); y[2] = dot(d, n); y[3] = length(d); y[4] = dot(d - n, d - n);"
         );
         let mut counts = vec![0u32; 16 * 32];
-        for y in probe(&["PHONG", "DIFFUSE"], &body, &inputs) {
+        for y in probe(&body, &inputs) {
             assert!((y[3] - 1.0).abs() < 2e-6, "length {}", y[3]);
             // By the angle itself, for a cosine near 1 has no digits left.
             let half = f64::from(y[4]) / 2.0;
@@ -358,12 +357,11 @@ fn strata_are_permuted() {
             .collect();
         let order = "hash_pixel(12345u, u32(x[1]), 7u).x";
         let body = format!("y[0] = f32(shuffled_cell(u32(x[0]), {count}u, {order}));");
-        let features: &[&str] = if count.is_power_of_two() {
-            &["STRATA"]
-        } else {
-            &["STRATA", "STRATA_NOT_A_POWER_OF_TWO"]
+        let features = ProbeFeatures {
+            strata: count.isqrt(),
+            ..ProbeFeatures::default()
         };
-        let out = probe(features, &body, &inputs);
+        let out = probe_with(&features, &body, &inputs);
         let mut first = vec![0; count as usize];
         for round in out.chunks(count as usize) {
             let mut seen = vec![false; count as usize];

@@ -1,4 +1,4 @@
-//! Scenes made in memory, and what is asked of them.
+//! Scenes made in memory, and helpers to trace them.
 
 use etendue::engine::{Counters, Engine};
 use etendue::film::Film;

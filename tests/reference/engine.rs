@@ -1,4 +1,4 @@
-//! The engine around the paths: what is on the film does not depend on how the work was cut.
+//! The CPU engine: the film does not depend on how the work is cut.
 
 use crate::build::*;
 use etendue::engine::{Counters, Engine, EngineError, Part};

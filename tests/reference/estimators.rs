@@ -1,4 +1,4 @@
-//! The estimator with light sampling held against the one without, and the modes against each other.
+//! Compares the estimator with light sampling with the one without, and the modes with each other.
 
 use crate::build::*;
 use etendue::film::Film;

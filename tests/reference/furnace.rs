@@ -28,7 +28,7 @@ fn dome_with(things: &[(Shape, Bsdf)]) -> Build {
 }
 
 #[test]
-fn what_loses_no_energy_vanishes_in_the_white_dome() {
+fn objects_without_loss_are_invisible_in_the_white_dome() {
     let ball = sphere(v(0.1, 0.4, 0.0), 0.25);
     let rod = cylinder(v(-0.3, 0.2, -0.2), v(0.3, 0.5, 0.0), 0.15);
     let small = |x: f64| sphere(v(x, 0.4, 0.0), 0.2);
@@ -82,7 +82,7 @@ fn light_sampling_finds_the_dome_s_radiance_to_a_thousandth_and_a_half() {
 }
 
 #[test]
-fn no_part_of_the_white_dome_stands_out() {
+fn the_white_dome_is_uniform() {
     let scene = dome_with(&[
         (sphere(v(-0.2, 0.4, 0.0), 0.2), GLASS),
         (sphere(v(0.2, 0.4, 0.0), 0.2), MIRROR),

@@ -1,4 +1,4 @@
-//! The CPU reference held against closed forms, and its two estimators against each other.
+//! Compares the CPU reference with closed forms, and its two estimators with each other.
 
 mod build;
 mod engine;

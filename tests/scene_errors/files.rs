@@ -48,7 +48,7 @@ fn message_about(content: &[u8]) -> String {
 
 #[test]
 fn files_that_are_no_text() {
-    let utf8 = "is not UTF-8, but a scene file is UTF-8 text";
+    let utf8 = "is not valid UTF-8; a scene file is UTF-8 text";
     assert_eq!(
         message_about(b"\xff\xfe[\0c\0"),
         format!(":1:1: byte 0xff {utf8}")
@@ -61,13 +61,13 @@ fn files_that_are_no_text() {
         message_about(b"\xef\xbb\xbf\xc3"),
         format!(":1:1: byte 0xc3 {utf8}")
     );
-    let nul = "a NUL character, but a scene file is TOML text";
+    let nul = "found a NUL character; a scene file is TOML text";
     assert_eq!(message_about(b"title\0 = 1"), format!(":1:6: {nul}"));
     let png = message_about(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
     assert_eq!(png, format!(":1:1: byte 0x89 {utf8}"));
     let zip = message_about(b"PK\x03\x04\x14\x00\x06");
     assert_eq!(zip, format!(":1:6: {nul}"));
-    assert!(message_about(b"").starts_with(": is empty"));
+    assert!(message_about(b"").starts_with(": the file is empty"));
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn files_of_absurd_size() {
     // Sparse: it takes no room.
     file.set_len(MAX_FILE_BYTES + 1).expect("grown");
     let error = read(&path).expect_err("too large").to_string();
-    let expected = "is 67108865 bytes long or longer; a scene file has at most 64 MiB";
+    let expected = "the file has 67108865 bytes or more; a scene file has at most 64 MiB";
     assert!(error.ends_with(expected), "{error}");
     assert!(matches!(read(&path), Err(ReadError::Invalid(_))));
 

@@ -1,4 +1,4 @@
-//! Keys, tables and syntax; how errors are told.
+//! Keys, tables and syntax; the form of error messages.
 
 use super::{FULL, errors, one, parse};
 
@@ -80,40 +80,40 @@ fn missing_keys_and_tables() {
     one(
         "radius = 0.125\n",
         "",
-        "60:1: [[sphere]] lacks radius, which must be a number from 1e-15 to 1e15 \
+        "60:1: missing key radius in [[sphere]]; it must be a number from 1e-15 to 1e15 \
          (limits of f32 kernels)",
     );
     one(
         "material = \"glass\"\n",
         "",
-        "60:1: [[sphere]] lacks material, which must be a string",
+        "60:1: missing key material in [[sphere]]; it must be a string",
     );
     one(
         "type = \"mirror\"\n",
         "",
-        "19:1: [material.steel] lacks type, which must be a string",
+        "19:1: missing key type in [material.steel]; it must be a string",
     );
     one(
         "vfov = 42\n",
         "",
-        "3:1: [camera] lacks vfov, which must be a number above 0 and below 180",
+        "3:1: missing key vfov in [camera]; it must be a number above 0 and below 180",
     );
 
     let (start, rest) = FULL.split_once("[camera]").expect("a camera");
     let without_camera = format!("{start}{}", &rest[rest.find("[render]").expect("render")..]);
     assert_eq!(
         parse(&without_camera).expect_err("no camera"),
-        ["s.toml: no [camera]: a scene has one"]
+        ["s.toml: no [camera]; a scene needs one"]
     );
     let light =
         &FULL[FULL.find("[[light]]").expect("light")..FULL.find("[[plane]]").expect("plane")];
     assert_eq!(
         parse(&FULL.replace(light, "")).expect_err("no light"),
-        ["s.toml: no [[light]]: a scene has at least one, or it is black"]
+        ["s.toml: no [[light]]; a scene needs at least one"]
     );
     let bare = &FULL[..FULL.find("[[plane]]").expect("plane")];
     let no_primitive = [
-        "s.toml: no primitive: a scene has at least one [[sphere]], [[plane]], [[disk]] or [[cylinder]]",
+        "s.toml: no primitive; a scene needs at least one [[sphere]], [[plane]], [[disk]] or [[cylinder]]",
     ];
     assert_eq!(parse(bare).expect_err("nothing there"), no_primitive);
     let empty_array = format!("sphere = []\n{bare}");
@@ -125,7 +125,7 @@ fn missing_keys_and_tables() {
         assert_eq!(
             parse(empty).expect_err("empty"),
             [
-                "s.toml: is empty; a scene has [camera], a [[light]], and a \
+                "s.toml: the file is empty; a scene needs [camera], a [[light]], and a \
               [[sphere]], [[plane]], [[disk]] or [[cylinder]]"
             ]
         );
@@ -134,7 +134,7 @@ fn missing_keys_and_tables() {
 
 #[test]
 fn duplicates_and_syntax() {
-    let once = "a key or [table] stands once; only [[tables]] repeat";
+    let once = "keys and [tables] must be unique; only [[tables]] can repeat";
     one(
         "vfov = 42",
         "vfov = 42\nvfov = 43",

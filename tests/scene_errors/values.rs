@@ -77,11 +77,11 @@ fn wrong_types() {
     one(
         "[camera]",
         "[[camera]]",
-        "3:1: camera is [[camera]], but must be one table, [camera]",
+        "3:1: camera is [[camera]], but must be a single table [camera]",
     );
     assert_eq!(
         errors("[[plane]]", "[plane]")[0],
-        "s.toml:38:1: plane must be an array of tables: write [[plane]] for each"
+        "s.toml:38:1: plane must be an array of tables; write [[plane]] for each one"
     );
     assert_eq!(
         errors("[[plane]]", "[plane]").len(),
@@ -210,12 +210,12 @@ fn degenerate_geometry() {
     one(
         "look_at = [0.0, 1.0, 0.0]",
         "look_at = [0.0, 1.0, 3.8]",
-        "5:11: look_at is at eye, but must be at least 1e-15 away from it",
+        "5:11: look_at equals eye, but must be at least 1e-15 away from it",
     );
     one(
         "up = [0, 2, 0]",
         "up = [0, 0, 5e-300]",
-        "6:6: up, along [0, 0, 1], is parallel to the view, along [0, 0, -1]; it must not be",
+        "6:6: up (direction [0, 0, 1]) is parallel to the view (direction [0, 0, -1]), but must not be",
     );
     let up = FULL
         .replace("up = [0, 2, 0]\n", "")
@@ -223,13 +223,13 @@ fn degenerate_geometry() {
     assert_eq!(
         parse(&up).expect_err("looks down"),
         [
-            "s.toml:3:1: up, along [0, 1, 0], is parallel to the view, along [0, -1, 0]; it must not be"
+            "s.toml:3:1: up (direction [0, 1, 0]) is parallel to the view (direction [0, -1, 0]), but must not be"
         ]
     );
     one(
         "top = [0.5, 0.9, -1.0]",
         "top = [0.5, 0.0, -1.0]",
-        "45:7: top is at base, but must be at least 1e-15 away from it",
+        "45:7: top equals base, but must be at least 1e-15 away from it",
     );
     // Tiny and huge directions are as good as any.
     let text = FULL.replace("[0, 1, 0]", "[0, 3e-300, 4e-300]");
@@ -263,8 +263,8 @@ fn rules_between_keys() {
     assert_eq!(
         parse(&disk).expect_err("a glass disk"),
         [
-            "s.toml:58:12: material \"glass\" is dielectric, but a disk bounds no solid; \
-          dielectrics may be on spheres, cylinders and planes"
+            "s.toml:58:12: material \"glass\" is dielectric, but a disk is not solid; \
+          dielectrics are allowed on spheres, cylinders and planes"
         ]
     );
 }

@@ -1,4 +1,4 @@
-//! What all panels have in common: log axes, curves, dashed lines, a legend.
+//! The parts common to all panels: log axes, curves, dashed lines, a legend.
 
 use super::Drawn;
 use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
@@ -22,7 +22,7 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
 ];
 
-/// The name in an SVG, for the viewer's own letters; in a PNG ours stand for it.
+/// The font name in an SVG, which uses the viewer's font. A PNG uses our own font.
 pub(super) const FONT: &str = "sans-serif";
 
 const GREY: RGBColor = RGBColor(120, 120, 120);
@@ -44,7 +44,7 @@ pub(super) struct Axes<'a> {
     pub y_label: fn(f64) -> String,
 }
 
-/// Draws everything so many times as large.
+/// Scales all lengths.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pen(pub u32);
 
@@ -199,7 +199,7 @@ fn ticks(low: f64, high: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A number without digits that say nothing.
+/// A number without superfluous digits.
 pub(super) fn plain(x: f64) -> String {
     if !(1e-4..1e6).contains(&x) {
         return format!("{x:.0e}");
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_have_no_idle_digits() {
+    fn labels_have_no_superfluous_digits() {
         for (x, text) in [
             (0.1, "0.1"),
             (10.0, "10"),

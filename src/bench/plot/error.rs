@@ -25,14 +25,14 @@ pub struct ErrorPanel {
 /// One engine's errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Whose.
+    /// The engine.
     pub engine: EngineKind,
     /// Seconds, relative error, and its standard deviation over seeds; all but the last above 0.
     pub points: Vec<[f64; 3]>,
 }
 
 impl ErrorPanel {
-    /// What there is to draw of these results.
+    /// The data to draw from these results.
     pub fn new(results: &Results) -> Self {
         let points = results.points();
         let curve = |engine: EngineKind| {
@@ -110,7 +110,7 @@ impl ErrorPanel {
         if let Some([x, y, _]) = last {
             let low = 0.7 * y;
             let guide = |t: f64| (t, low * (t / x).powf(-0.5));
-            // What leaves the chart is not cut off but bent along its edge.
+            // The library does not clip lines outside the chart, but bends them along its edge.
             let at = |error: f64| x * (low / error).powi(2);
             let ends = [x0.max(at(y1)), x1.min(at(y0))].map(guide);
             pen.dashes(&mut chart, ends, [6.0, 4.0], [1.0, 0.5], "slope -1/2")?;
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_is_an_empty_plot() {
+    fn a_plot_without_results_is_empty() {
         let empty = ErrorPanel {
             title: "none".into(),
             curves: vec![Curve {

@@ -23,7 +23,7 @@ const PANEL: [u32; 2] = [560, 440];
 /// Pixels of a PNG for a unit, so that print is sharp.
 const PIXELS: u32 = 2;
 
-/// Each of them is the mean of so many squared: polygons and text are drawn without smoothing otherwise.
+/// Each pixel is the mean of this number squared of drawn pixels, since polygons and text are drawn without smoothing.
 const SMOOTHING: u32 = 2;
 
 /// One of the drawings of a plot.
@@ -31,7 +31,7 @@ const SMOOTHING: u32 = 2;
 pub enum Panel {
     /// Error against seconds.
     Error(ErrorPanel),
-    /// Seconds a path against the number of things.
+    /// Seconds per path against the number of objects.
     Scaling(ScalingPanel),
 }
 
@@ -52,7 +52,7 @@ impl Format {
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
             _ => Err(format!(
-                "{}: a plot's name ends in .svg or .png",
+                "{}: the name of a plot must end in .svg or .png",
                 path.display()
             )),
         }

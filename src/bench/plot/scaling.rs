@@ -1,4 +1,4 @@
-//! Seconds a path against the number of things.
+//! Seconds per path against the number of objects.
 
 use super::Drawn;
 use super::chart::{Axes, Pen, plain, range};
@@ -15,14 +15,14 @@ pub struct ScalingPanel {
     title: String,
     /// Below it: what is counted.
     things: &'static str,
-    /// Names of engines, counts, and nanoseconds a path.
+    /// Names of engines, counts, and nanoseconds per path.
     curves: Vec<(&'static str, Vec<(f64, f64)>)>,
-    /// Counts at which a rule changes its mind, and what it is about.
+    /// Counts at which the renderer's default changes, with their labels.
     marks: Vec<(f64, String)>,
 }
 
 impl ScalingPanel {
-    /// What there is to draw of this series.
+    /// The data to draw from this series.
     pub fn new(scaling: &Scaling) -> Self {
         let [width, height] = scaling.size;
         let device = scaling
@@ -39,7 +39,7 @@ impl ScalingPanel {
         };
         let baked = scaling
             .baked_up_to()
-            .map(|n| (n as f64, format!("the rule bakes up to {n}")));
+            .map(|n| (n as f64, format!("gpu-baked by default up to {n}")));
         let looked_at = scaling
             .looked_at_up_to()
             .map(|n| (n as f64, format!("no light tree up to {n}")));
@@ -67,7 +67,7 @@ impl ScalingPanel {
             area,
             &Axes {
                 title: &self.title,
-                names: [self.things, "nanoseconds a path"],
+                names: [self.things, "nanoseconds per path"],
                 ranges: [x, y],
                 y_label: plain,
             },
@@ -111,8 +111,8 @@ mod tests {
         for word in [
             "gpu-baked",
             "gpu-tree",
-            "nanoseconds a path",
-            "the rule bakes up to 53",
+            "nanoseconds per path",
+            "gpu-baked by default up to 53",
             "spheres, 512x384",
         ] {
             assert!(text.contains(word), "no {word}");

@@ -1,4 +1,4 @@
-//! Where two lines of cost against number cross.
+//! Finds where two curves of cost against number cross.
 
 /// Which of two is cheaper.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,8 +11,8 @@ pub enum Crossing {
     Before(usize),
 }
 
-/// Where the `first` line, of rising counts and costs above 0, comes to lie above the `second` for good: on the straight
-/// line between counts that log axes show. `None` if they have no count in common.
+/// Where the `first` curve, of rising counts and costs above 0, stays above the `second` from then on. Interpolates linearly
+/// on log axes. `None` if they have no count in common.
 pub fn crossing(first: &[(usize, f64)], second: &[(usize, f64)]) -> Option<Crossing> {
     let other = |count: usize| second.iter().find(|(n, _)| *n == count);
     // By how much the first is dearer, at the counts of both.

@@ -1,8 +1,8 @@
-//! Seconds a path against the number of things: where a look at every one of them comes to cost more than the way
-//! through a tree.
+//! Measures seconds per path against the number of objects, and finds the number from which a tree is faster than testing
+//! every object.
 //!
-//! Scenes of 1, 2, 4, ... spheres, and of as many lamps, are the same picture whatever the number. Engines take turns
-//! at each count: what else the machine does meanwhile hits all of them alike.
+//! The scenes have 1, 2, 4, ... spheres or lamps, and similar pictures for every number. The engines take turns at each
+//! count, so that other load on the machine affects all of them equally.
 
 pub mod crossing;
 pub mod text;
@@ -14,24 +14,24 @@ use crate::engine::{Counters, DeviceInfo, EngineError};
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::gpu::Gpu;
-use crate::kernel::{BAKED_LIMIT, MOST_LOOKED_AT};
+use crate::kernel::BAKED_LIMIT;
 use crate::run::{CALL, Job, Run, StopReason, Tally};
 use crate::scene::{Diagnostic, Scene, generate};
 use crate::settings::{Overrides, Settings};
-use crate::world::World;
+use crate::world::{MOST_LOOKED_AT, World};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// Seconds after which a kernel with the values in its text is given no more of them: its compiler takes longer the
-/// longer the text is, and cannot be interrupted.
+/// If compiling a baked kernel takes longer than this, larger counts are skipped: compile time grows with the number of
+/// objects, and compiling can't be interrupted.
 const LONGEST_COMPILE: f64 = 4.0;
 
-/// Pictures for each count, of which the fastest counts: what else the machine does only ever adds to the time.
+/// Pictures per count. The fastest one is used, since other load on the machine only adds time.
 const PICTURES: u32 = 3;
 
-/// What there is more and more of.
+/// The kind of object that grows in number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Series {
     /// [`generate::spheres`].
@@ -63,7 +63,7 @@ impl Series {
         format!("{count} {name}")
     }
 
-    /// The scene of so many.
+    /// The scene with `count` objects.
     pub fn scene(self, count: usize) -> Result<Scene, Vec<Diagnostic>> {
         let generated = match self {
             Self::Spheres => generate::spheres(count, 0, "rows.csv"),
@@ -78,9 +78,9 @@ impl Series {
 pub struct Plan {
     /// The largest count.
     pub most: usize,
-    /// Rendering time of each engine over all counts, warming up apart. Its first count is measured whatever it takes.
+    /// Rendering time of each engine over all counts, without warm-up. Its first count is always measured.
     pub time: Duration,
-    /// The most samples a pixel.
+    /// Most samples per pixel.
     pub most_samples: u64,
 }
 
@@ -109,7 +109,7 @@ pub struct Timing {
     pub compile_seconds: f64,
     /// See [`Contender::warm_up_seconds`].
     pub warm_up_seconds: f64,
-    /// Samples a pixel, on average.
+    /// Samples per pixel, on average.
     pub samples: f64,
     /// Seconds in the engine, reading back included.
     pub seconds: f64,
@@ -170,13 +170,13 @@ impl Scaling {
         }
     }
 
-    /// Counts and seconds a path of one engine.
+    /// Counts and seconds per path of one engine.
     pub fn costs(&self, engine: EngineKind) -> Vec<(usize, f64)> {
         let mine = self.timings.iter().filter(|t| t.engine == engine);
         mine.map(|t| (t.count, t.seconds_per_path())).collect()
     }
 
-    /// The engines that look at every surface and were measured beside the one that has trees, and where they are even.
+    /// The engines without trees that were measured together with gpu-tree, and the counts where both are equally fast.
     pub fn crossings(&self) -> Vec<(EngineKind, Crossing)> {
         let tree = self.costs(EngineKind::GpuTree);
         [EngineKind::GpuBaked, EngineKind::GpuBuffers]
@@ -185,13 +185,13 @@ impl Scaling {
             .collect()
     }
 
-    /// The largest count with which a scene is baked unless the user says otherwise.
+    /// The largest count for which render uses gpu-baked by default.
     pub fn baked_up_to(&self) -> Option<usize> {
         let most = BAKED_LIMIT.checked_sub(self.others)?;
         (self.has(EngineKind::GpuBaked) && most > 0).then_some(most)
     }
 
-    /// The largest count with which the kernel with trees looks at every light when it chooses one.
+    /// The largest count for which gpu-tree weighs every light when it chooses one.
     pub fn looked_at_up_to(&self) -> Option<usize> {
         let most = MOST_LOOKED_AT.checked_sub(self.other_lights)?;
         (self.series == Series::Lights && self.has(EngineKind::GpuTree)).then_some(most)
@@ -207,15 +207,15 @@ impl Scaling {
     }
 }
 
-/// An engine's line that goes on.
+/// An engine whose line has not ended.
 struct Line {
     engine: EngineKind,
     /// Seconds of rendering that it still has.
     left: f64,
 }
 
-/// Measures; what is done is in `scaling` whatever happens. True unless `stop` was set. `show` is told the share that is
-/// done, and of what.
+/// Runs the plan. `scaling` holds the results so far, even after an error. Returns false if `stop` was set. Calls `show` with
+/// the fraction done and a description.
 pub fn measure(
     scaling: &mut Scaling,
     gpu: Option<&Arc<Gpu>>,
@@ -233,7 +233,7 @@ pub fn measure(
             break;
         }
         let things = scaling.series.of(count);
-        show(share(k, 0.0, &counts), &format!("making {things}"));
+        show(share(k, 0.0, &counts), &format!("preparing {things}"));
         let scene = scaling.series.scene(count).map_err(|wrong| {
             let all: Vec<String> = wrong.iter().map(Diagnostic::to_string).collect();
             EngineError::Device(all.join("\n"))
@@ -255,7 +255,7 @@ pub fn measure(
             let mut contender = match Contender::new(line.engine, gpu, &world, &settings, stop) {
                 Ok(contender) => contender,
                 Err(Unready::Engine(EngineError::Stopped)) => return Ok(false),
-                // That a driver can do no more is the end of a line, but not that it can do nothing.
+                // A driver that fails at a larger count ends the line; one that fails at the first count is an error.
                 Err(Unready::Gpu(e)) if k > 0 => {
                     scaling.end(line.engine, e.to_string());
                     continue;
@@ -289,14 +289,15 @@ fn share(k: usize, part: f64, counts: &[usize]) -> f64 {
     (k as f64 + part) / counts.len() as f64
 }
 
-/// Why a line does not go on after this, with so many seconds left.
+/// Why an engine's line ends here, given the seconds left.
 fn ends_with(timing: &Timing, left: f64) -> Option<String> {
     if timing.engine == EngineKind::GpuBaked && timing.compile_seconds > LONGEST_COMPILE {
         return Some(format!("compiling took {:.1} s", timing.compile_seconds));
     }
-    // Of twice as many things, if each is looked at.
+    // For twice as many objects, if each one is tested.
     let sample = 2.0 * timing.seconds / timing.samples;
-    (sample > left).then(|| format!("more may take longer than the {left:.1} s left of --time"))
+    (sample > left)
+        .then(|| format!("the next count may take longer than the {left:.1} s left of --time"))
 }
 
 /// The fastest of [`PICTURES`] pictures in about `time`, fewer where one sample of every pixel takes long, and the seconds
@@ -321,7 +322,7 @@ fn time_paths(
     let mut best: Option<Timing> = None;
     let mut spent = 0.0;
     for made in 0..PICTURES {
-        // The last one tells what the next one takes.
+        // The last picture predicts the time of the next.
         if made > 0 && spent * f64::from(made + 1) / f64::from(made) > 1.5 * time {
             break;
         }

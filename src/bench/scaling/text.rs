@@ -49,7 +49,7 @@ fn columns(scaling: &Scaling) -> String {
         "compile, s",
         "warm-up, s",
         "samples",
-        "ns a path",
+        "ns per path",
         "million paths/s",
         "rays/path",
     ]);
@@ -70,35 +70,35 @@ fn columns(scaling: &Scaling) -> String {
     columns.text()
 }
 
-/// Where an engine and the one with trees are even.
+/// Where an engine and gpu-tree are equally fast.
 fn even(scaling: &Scaling, engine: EngineKind, crossing: Crossing) -> String {
     let (first, tree) = (engine.name(), EngineKind::GpuTree.name());
     let things = |n| scaling.series.of(n);
     match crossing {
         Crossing::At(n) => {
             let at = things(n.round() as usize);
-            format!("{first} and {tree} cost the same at {at}\n")
+            format!("{first} and {tree} are equally fast at {at}\n")
         }
         Crossing::Beyond(n) => format!(
-            "{first} costs less than {tree} up to {} or more\n",
+            "{first} is faster than {tree} up to {} or more\n",
             things(n)
         ),
-        Crossing::Before(n) => format!("{tree} costs less than {first} from {} on\n", things(n)),
+        Crossing::Before(n) => format!("{tree} is faster than {first} from {} on\n", things(n)),
     }
 }
 
-/// What is taken unless the user says otherwise.
+/// What the renderer uses by default.
 fn rule(scaling: &Scaling) -> String {
     let mut text = String::new();
     if let Some(most) = scaling.baked_up_to() {
         text += &format!(
-            "the rule takes gpu-baked up to {}, for compiling costs time too\n",
+            "render uses gpu-baked by default up to {}, since compiling takes time too\n",
             scaling.series.of(most)
         );
     }
     if let Some(most) = scaling.looked_at_up_to() {
         text += &format!(
-            "gpu-tree looks at every light up to {}, and chooses by a tree of them beyond\n",
+            "gpu-tree weighs every light up to {}, and uses a light tree beyond that\n",
             scaling.series.of(most)
         );
     }
@@ -112,15 +112,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_series_says_where_lines_end_and_cross_and_what_the_rule_is() {
+    fn a_series_reports_ends_crossings_and_defaults() {
         let text = text(&scaling());
         for line in [
             "spheres: 512x384, 3 other surfaces",
-            "engine     spheres  compile, s  warm-up, s  samples  ns a path  million paths/s  rays/path",
-            "gpu-baked      256        0.20        0.10     10.0       2560            0.391       6.00",
+            "engine     spheres  compile, s  warm-up, s  samples  ns per path  million paths/s  rays/path",
+            "gpu-baked      256        0.20        0.10     10.0         2560            0.391       6.00",
             "gpu-baked ends at 256 spheres: compiling took 4.2 s",
-            "gpu-baked and gpu-tree cost the same at 50 spheres",
-            "the rule takes gpu-baked up to 53 spheres, for compiling costs time too",
+            "gpu-baked and gpu-tree are equally fast at 50 spheres",
+            "render uses gpu-baked by default up to 53 spheres, since compiling takes time too",
         ] {
             assert!(text.lines().any(|l| l == line), "no {line:?} in {text}");
         }

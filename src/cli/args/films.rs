@@ -11,17 +11,17 @@ use std::path::PathBuf;
     after_help = "Example:\n  etendue develop long.npz -o picture.exr -o bright.png --exposure 1"
 )]
 pub struct DevelopArgs {
-    /// The film
+    /// Film to read
     pub film: PathBuf,
-    /// Picture to write, .exr or .png; repeatable
+    /// Picture to write, .exr or .png. Repeatable
     #[arg(short, long, required = true, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Exposure of PNG pictures, in stops; then the sRGB curve
+    /// Exposure of PNG pictures in stops, applied before the sRGB curve
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = values::exposure,
           allow_hyphen_values = true)]
     pub exposure: f64,
 
-    /// How much to say.
+    /// How much to print.
     #[command(flatten)]
     pub talk: Talk,
 }
@@ -33,13 +33,13 @@ Examples:
   etendue merge whole.npz first.npz second.npz
   etendue develop whole.npz -o whole.exr")]
 pub struct MergeArgs {
-    /// The film to write; it must not exist yet
+    /// Film to write. It must not exist yet
     pub out: PathBuf,
-    /// The films to add
+    /// Films to merge
     #[arg(required = true, value_name = "FILM")]
     pub films: Vec<PathBuf>,
 
-    /// How much to say.
+    /// How much to print.
     #[command(flatten)]
     pub talk: Talk,
 }

@@ -16,81 +16,81 @@ use std::time::Duration;
 #[command(after_help = "\
 Examples:
   etendue render scenes/three_materials.toml
-      three_materials.exr and three_materials.png at 256 samples a pixel
+      writes three_materials.exr and three_materials.png at 256 samples per pixel
   etendue render scene.toml --error 2% --time 10m -o picture.exr
-      until the error is 2 %, but no longer than ten minutes
+      stops at a relative error of 2 %, or after ten minutes
   etendue render scene.toml --film long.npz --spp 10000
-      leave it, kill it, and go on with the same command
+      can be interrupted at any time: the same command resumes it
   etendue render scene.toml --samples 0..512 --film a.npz
   etendue render scene.toml --samples 512..1024 --film b.npz
-      on two machines; then: etendue merge whole.npz a.npz b.npz
+      splits a picture across two machines; then: etendue merge whole.npz a.npz b.npz
   etendue render scene.toml --region 0,0,64,64 --region 100,80,164,144
-      two parts, each bit-identical to the same pixels of the whole picture
+      renders two regions, bit-identical to the same pixels of the whole picture
 
-Ctrl-C, SIGTERM and SIGHUP end a run after saving what there is: film, pictures and report. A second one ends it at once, and \
-what was not saved yet is lost; a film is then as the last checkpoint left it. The .lock file that may stay beside it holds up \
-nobody.
+Ctrl-C, SIGTERM and SIGHUP stop a run and save its results so far: film, pictures and report. A second signal stops it at \
+once: anything not saved yet is lost, and the film stays as of the last checkpoint. A leftover .lock file beside the film is \
+harmless.
 
-The relative error is null in the report, and not in headers, where a pixel has a single sample: nothing is known then. With \
-strata² samples or fewer it is an upper estimate, by the samples' second moment; with more, the spread of independent \
-replicates tells it.")]
+The relative error is unknown while a pixel has only one sample: it is then null in the report and missing from headers. With \
+up to strata² samples per pixel it is an upper estimate, from the second moment of the samples. With more it is estimated \
+from the spread of independent replicates.")]
 pub struct RenderArgs {
-    /// The scene file
+    /// Scene file
     pub scene: PathBuf,
 
-    /// Picture to write, .exr (32-bit float) or .png (8-bit); repeatable
+    /// Picture to write, .exr (32-bit float) or .png (8-bit). Repeatable
     /// [default: STEM.exr and STEM.png in the working directory]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Exposure of PNG pictures, in stops; then the sRGB curve
+    /// Exposure of PNG pictures in stops, applied before the sRGB curve
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = values::exposure,
           allow_hyphen_values = true)]
     pub exposure: f64,
-    /// Rewrite this .png every few seconds, for an image viewer to follow
+    /// Rewrite this .png every few seconds, for an image viewer that reloads it
     #[arg(long, value_name = "FILE.png")]
     pub watch: Option<PathBuf>,
-    /// Write what happened as JSON; - is stdout
+    /// Write a run summary as JSON, to stdout with -
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
-    /// Write the kernel made for this scene; - is stdout
+    /// Write the WGSL kernel generated for this scene, to stdout with -
     #[arg(long, value_name = "FILE")]
     pub dump_wgsl: Option<PathBuf>,
 
-    /// Samples a pixel in all, what a film already holds included
-    /// [default: 256 when nothing else ends the run]
+    /// Total samples per pixel, including those already in the film
+    /// [default: 256 if no other stop condition is given]
     #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true, help_heading = "When to stop")]
     pub spp: Option<u64>,
-    /// Rays for every stratum of a pixel: strata² x N samples a pixel
+    /// Rays per pixel-sample, as in the report: strata² x N samples per pixel
     #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true, help_heading = "When to stop")]
     pub rays: Option<u64>,
-    /// Stop after this long rendering (90s, 2m, 1h30m), but not before every pixel has a sample
+    /// Stop after this rendering time (90s, 2m, 1h30m), but not before every pixel has a sample
     #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true, help_heading = "When to stop")]
     pub time: Option<Duration>,
-    /// Stop when the estimated relative error is at most this: 0.02 or 2%
+    /// Stop when the estimated relative error is at most E, such as 0.02 or 2%
     #[arg(long, value_name = "E", value_parser = values::relative_error, allow_hyphen_values = true, help_heading = "When to stop")]
     pub error: Option<f64>,
     #[arg(long, value_name = "A..B", value_parser = values::sample_range, allow_hyphen_values = true, help_heading = "When to stop",
           conflicts_with_all = ["spp", "rays", "time", "error"],
-          help = format!("Just the samples numbered A to B-1, to share a picture among machines; slices that start \
-                          and end on multiples of {BLOCK} merge to the single run within 1e-12, others within 1e-6"))]
+          help = format!("Take only samples A to B-1, to split a picture across machines. Merged films equal a single run to \
+                          1e-12 if A and B are multiples of {BLOCK}, else to 1e-6"))]
     /// `--samples A..B`.
     pub samples: Option<Range<u64>>,
 
-    /// Sample where the error is: --spp and --rays are then the mean over the pixels. Pilots, samples that are in no picture,
-    /// decide where; they take an eighth of the time of 32 samples, a 32nd of that of 128, and less of more. A film made so is
-    /// gone on with so
+    /// Take more samples where the error is larger. --spp and --rays then set the mean over the pixels. Pilot samples, which
+    /// are not part of the picture, measure the error; they cost 1/8 of the time at 32 samples per pixel, 1/32 at 128. An
+    /// adaptive film can only be resumed with --adaptive
     #[arg(long, conflicts_with = "samples", help_heading = "What to render")]
     pub adaptive: bool,
     /// Width and height in pixels instead of the scene's
     #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, help_heading = "What to render")]
     pub size: Option<[u32; 2]>,
-    /// Only this half-open pixel rectangle; repeatable
+    /// Render only this pixel rectangle; X1 and Y1 are exclusive. Repeatable
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = values::rect, allow_hyphen_values = true, help_heading = "What to render")]
     pub region: Vec<Rect>,
-    /// Which light to keep, by commas: emitted (scattered nowhere), direct (once), indirect (more often)
+    /// Which light to keep, separated by commas: emitted (not scattered), direct (scattered once), indirect (scattered twice or more) [default: all]
     #[arg(long, value_name = "LIST", value_parser = values::light, allow_hyphen_values = true, help_heading = "What to render")]
     pub light: Option<LightParts>,
-    /// How light travels; whitted: mirrors and glass are followed, other surfaces take direct light only
+    /// path is full path tracing; whitted follows mirrors and glass, with only direct light on other surfaces
     #[arg(
         long,
         value_enum,
@@ -99,37 +99,37 @@ pub struct RenderArgs {
         help_heading = "What to render"
     )]
     pub integrator: IntegratorName,
-    /// Light samples at every vertex, over all lights together [default: chosen from the scene]
+    /// Light samples per path vertex, over all lights together [default: chosen from the scene]
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub shadow_rays: Option<u32>,
-    /// Path vertices after the eye, the one on the light included
+    /// Most path vertices after the eye, including the one on the light
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, u32::MAX.into()), allow_hyphen_values = true, help_heading = "What to render")]
     pub max_depth: Option<u32>,
-    /// Cells a side into which a pixel is divided
+    /// Divide each pixel into N x N strata
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, LARGEST_STRATA.into()), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub strata: Option<u32>,
-    /// Seed of every random number
+    /// Seed of the random numbers
     #[arg(long, value_name = "N", value_parser = values::seed(), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub seed: Option<u32>,
 
-    /// What renders: any adapter (gpu), the f64 reference (cpu), or the best there is (auto)
-    #[arg(long, value_enum, default_value_t = Backend::Auto, value_name = "NAME", help_heading = "What with")]
+    /// What to render on: gpu is any adapter, cpu the f64 reference, auto the best available
+    #[arg(long, value_enum, default_value_t = Backend::Auto, value_name = "NAME", help_heading = "Device")]
     pub backend: Backend,
-    /// The adapter whose name contains NAME, in any case
-    #[arg(long, value_name = "NAME", value_parser = values::part_of_name, help_heading = "What with")]
+    /// Use the adapter whose name contains NAME (ignoring case)
+    #[arg(long, value_name = "NAME", value_parser = values::part_of_name, help_heading = "Device")]
     pub adapter: Option<String>,
 
-    /// Progressive accumulation: create this film (.npz), or go on with it
+    /// Accumulate samples in this film (.npz): create it, or resume it if it exists
     #[arg(long, value_name = "FILE", help_heading = "Films")]
     pub film: Option<PathBuf>,
-    /// How often the film is saved meanwhile [default: 60s]
+    /// How often to save the film during the run [default: 60s]
     #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true, requires = "film", help_heading = "Films")]
     pub checkpoint: Option<Duration>,
 
-    /// How much to say.
+    /// How much to print.
     #[command(flatten)]
     pub talk: Talk,
 }
@@ -137,9 +137,9 @@ pub struct RenderArgs {
 /// `--integrator`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum IntegratorName {
-    /// The whole of the rendering equation.
+    /// The full rendering equation.
     Path,
-    /// Mirrors and glass are followed, other surfaces take direct light only.
+    /// Follows mirrors and glass, with only direct light on other surfaces.
     Whitted,
 }
 

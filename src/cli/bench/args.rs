@@ -11,11 +11,11 @@ use std::time::Duration;
 /// `etendue bench`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Every engine makes pictures of 1, 2, 4, ... samples a pixel, each with several seeds and each begun anew; engines take \
-turns. All are held against a reference picture, whose own noise is subtracted from squared errors. A spread (±) is the \
-standard deviation of a single seed. Efficiency is 1 / (MSE x seconds), reading back included, compiling and warming up \
-not; compare it within one run alone. The reference's file depends on the scene and on all it is made with, the kernel \
-too: to compare kernels, give both the same --reference.
+Each engine renders pictures with 1, 2, 4, ... samples per pixel, each with several seeds and each from the first sample. \
+The engines take turns. Every picture is compared with a reference picture, whose own noise is subtracted from the squared \
+errors. A spread (±) is the standard deviation of a single seed. Efficiency is 1 / (MSE x seconds); the seconds include \
+reading back, but not compiling and warming up. Compare efficiencies only within one run. The cached reference depends on \
+the scene, the engine and its kernel: to compare two kernels, give both runs the same --reference.
 
 Examples:
   etendue bench scenes/three_materials.toml
@@ -24,8 +24,8 @@ Examples:
   etendue bench --report-table --time 10m
   etendue bench --scaling --plot scaling.svg --json scaling.jsonl
 
-Exit status: 0 measured; 2 bad command line or input; 3 no adapter or it failed; 4 a file can't be read or written; \
-130, 143 or 129 interrupted, after showing what was measured.")]
+Exit status: 0 success; 2 bad command line or invalid input; 3 no usable adapter, or the device failed; 4 a file can't be \
+read or written; 130, 143 or 129 interrupted, after printing the results so far.")]
 pub struct BenchArgs {
     /// Scene files
     #[arg(
@@ -34,76 +34,78 @@ pub struct BenchArgs {
         conflicts_with_all = ["report_table", "scaling"]
     )]
     pub scenes: Vec<PathBuf>,
-    /// Engines, by commas or repeated: gpu-baked (scene values in the kernel's text), gpu-buffers, gpu-tree, cpu (the f64
-    /// reference), cpu-brute (the same without light sampling); ratios are to the first
-    /// [default: what render would take, and without --report-table cpu; with --scaling gpu-baked,gpu-buffers,gpu-tree]
+    /// Engines, separated by commas or repeated: gpu-baked (scene values as constants in the kernel), gpu-buffers (in
+    /// buffers), gpu-tree (in a bounding-volume tree), cpu (the f64 reference), cpu-brute (the reference without light
+    /// sampling). Ratios are relative to the first [default: the one that render would choose, and cpu unless
+    /// --report-table is given; with --scaling gpu-baked,gpu-buffers,gpu-tree]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = engine)]
     pub engine: Vec<EngineKind>,
-    /// Rendering time of each engine and scene (with --scaling, series), over all its pictures; its pictures of one sample
-    /// are made whatever they take [default: 20s, with --report-table 4m]
+    /// Rendering time for each engine and scene (with --scaling: and series), over all its pictures. Pictures with one
+    /// sample per pixel are always rendered [default: 20s, with --report-table 4m]
     #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true)]
     pub time: Option<Duration>,
-    /// Pictures of each sample count, each with another seed
+    /// Pictures per sample count, each with a different seed
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true)]
     pub seeds: u32,
-    /// The most samples a pixel, however much time is left
+    /// Most samples per pixel, even if time is left
     #[arg(long, value_name = "N", default_value_t = 1 << 20, value_parser = values::samples, allow_hyphen_values = true)]
     pub max_spp: u64,
-    /// The report's Figure 9 instead: seconds for 1, 32, 128 and 256 rays per pixel-sample of indirect light, direct
-    /// light, both with several lights, and three materials
+    /// Reproduce Figure 9 of the report instead: seconds for 1, 32, 128 and 256 rays per pixel-sample, for indirect light,
+    /// direct light, both with several lights, and three materials
     #[arg(long, conflicts_with_all = ["reference", "plot"])]
     pub report_table: bool,
-    /// Seconds a path against the number of spheres and of lights instead, 1, 2, 4, ..., and the number from which a tree
-    /// costs less than a look at each. An engine goes no further when its compiler takes seconds or its --time is over
+    /// Measure seconds per path against the number of spheres and of lights (1, 2, 4, ...) instead, and find the number from
+    /// which a tree is faster than testing each one. An engine stops at the number where compiling takes seconds or its
+    /// --time is used up
     #[arg(long, conflicts_with_all = ["report_table", "reference", "reference_spp", "cache", "seeds"])]
     pub scaling: bool,
-    /// The most spheres, and lights, of --scaling
+    /// Most spheres, and most lights, for --scaling
     #[arg(long, value_name = "N", default_value_t = 100_000, conflicts_with_all = ["scenes", "report_table"],
           value_parser = values::whole::<u32>(1, 5_000_000), allow_hyphen_values = true)]
     pub up_to: u32,
 
-    /// Hold pictures against this one, an .exr or a film of the same scene, instead of making one
+    /// Compare with this picture, an .exr or a film of the same scene, instead of rendering a reference
     #[arg(long, value_name = "FILE", help_heading = "Reference")]
     pub reference: Option<PathBuf>,
-    /// Samples a pixel of a reference that is made, by the first engine that is not cpu-brute
+    /// Samples per pixel of the reference, which the first engine other than cpu-brute renders
     #[arg(long, value_name = "N", default_value_t = 512, value_parser = values::samples, allow_hyphen_values = true,
           conflicts_with = "reference", help_heading = "Reference")]
     pub reference_spp: u64,
-    /// Where references are kept [default: etendue in the user's cache folder]
+    /// Folder where references are cached [default: etendue in the user's cache folder]
     #[arg(long, value_name = "DIR", help_heading = "Reference")]
     pub cache: Option<PathBuf>,
 
-    /// Write what was measured as JSON lines; - is stdout, and the tables then go to stderr
+    /// Write the results as JSON lines. With - they go to stdout, and the tables go to stderr
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
-    /// Draw error against seconds (with --scaling, seconds a path against number), .svg or .png; repeatable
+    /// Plot error against seconds (with --scaling: seconds per path against number), .svg or .png. Repeatable
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub plot: Vec<PathBuf>,
 
     /// Width and height in pixels instead of the scene's
     #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, help_heading = "What to render")]
     pub size: Option<[u32; 2]>,
-    /// Which light to keep, by commas: emitted, direct, indirect
+    /// Which light to keep, separated by commas: emitted, direct, indirect [default: all]
     #[arg(long, value_name = "LIST", value_parser = values::light, allow_hyphen_values = true, conflicts_with = "report_table",
           help_heading = "What to render")]
     pub light: Option<LightParts>,
-    /// Light samples at every vertex, over all lights together [default: chosen from the scene]
+    /// Light samples per path vertex, over all lights together [default: chosen from the scene]
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub shadow_rays: Option<u32>,
-    /// Cells a side into which a pixel is divided
+    /// Divide each pixel into N x N strata
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 1024), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub strata: Option<u32>,
-    /// The first of the seeds
+    /// First seed; the others follow it
     #[arg(long, value_name = "N", value_parser = values::seed(), allow_hyphen_values = true,
           help_heading = "What to render")]
     pub seed: Option<u32>,
-    /// The adapter whose name contains NAME, in any case
-    #[arg(long, value_name = "NAME", value_parser = values::part_of_name, help_heading = "What with")]
+    /// Use the adapter whose name contains NAME (ignoring case)
+    #[arg(long, value_name = "NAME", value_parser = values::part_of_name, help_heading = "Device")]
     pub adapter: Option<String>,
 
-    /// How much to say.
+    /// How much to print.
     #[command(flatten)]
     pub talk: Talk,
 }
@@ -125,6 +127,6 @@ impl BenchArgs {
 fn engine(name: &str) -> Result<EngineKind, String> {
     EngineKind::from_name(name.trim()).ok_or_else(|| {
         let all = EngineKind::ALL.map(EngineKind::name).join(", ");
-        format!("no engine of that name; there are: {all}")
+        format!("unknown engine; the engines are: {all}")
     })
 }

@@ -1,4 +1,4 @@
-//! `etendue bench`: speed against error.
+//! `etendue bench`: error against rendering time.
 
 pub mod args;
 mod report_table;
@@ -28,27 +28,27 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Rendering time of each engine and scene unless the user says.
+/// Default rendering time for each engine and scene.
 const TIME: Duration = Duration::from_secs(20);
 
-/// Measures, and shows what was measured, whatever ended it.
+/// Runs the benchmark, and prints the results so far if it ends early.
 pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let (plots, mut files) = check_files(args)?;
     if args.reference.is_some() && args.scenes.len() > 1 {
         return Err(Failure::Input(format!(
-            "--reference is one picture, and there are {} scenes",
+            "--reference needs a single scene, found {}",
             args.scenes.len()
         )));
     }
     super::set_threads(args.talk.threads);
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
-    // Scenes with errors are refused before any is measured.
+    // Refuse scenes with errors before the first measurement.
     let read =
         |path: &PathBuf| parse::parse_str(path, &parse::read_text(path)?).map_err(Failure::Scene);
     let scenes: Vec<Scene> = args.scenes.iter().map(read).collect::<Result<_, _>>()?;
     for path in scenes.iter().flat_map(|s| &s.row_files) {
-        files.reads("a file of rows of a scene", path)?;
+        files.reads("a table of a scene", path)?;
     }
     let gpu = open(args)?;
     let mut bench = Bench {
@@ -77,8 +77,8 @@ pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
     }
 }
 
-/// Plots with their formats, and all files. Refuses plots of unknown formats, files that could not be written in the end, and
-/// those that would take another's place.
+/// The plots with their formats, and all files. Refuses plots of unknown formats, outputs that can't be written, and outputs
+/// that would overwrite another file.
 fn check_files(args: &BenchArgs) -> Result<(Vec<(PathBuf, plot::Format)>, Files), Failure> {
     let mut plots = Vec::new();
     for path in &args.plot {
@@ -101,13 +101,13 @@ fn check_files(args: &BenchArgs) -> Result<(Vec<(PathBuf, plot::Format)>, Files)
     Ok((plots, files))
 }
 
-/// The adapter, if an engine that was asked for needs one, or if none was asked for and there is one.
+/// The adapter, if one of the given engines needs it. Without `--engine`: the adapter that a render would use, if any.
 fn open(args: &BenchArgs) -> Result<Option<Arc<Gpu>>, Failure> {
     let wanted = match args.engine[..] {
         [] => Backend::Auto,
         ref e if e.iter().any(|e| e.on_gpu()) => Backend::Gpu,
         _ if args.adapter.is_some() => {
-            let message = "--adapter names a GPU adapter, and no --engine is on one";
+            let message = "--adapter can't be used here: no --engine runs on an adapter";
             return Err(Failure::Input(message.into()));
         }
         _ => return Ok(None),
@@ -130,7 +130,7 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// Every scene; what there is to draw comes into `panels` whatever happens.
+    /// Measures every scene. Adds its results to `panels` even if it ends early.
     fn scenes(&mut self, scenes: &[Scene], panels: &mut Vec<Panel>) -> Result<(), Failure> {
         for (path, scene) in self.args.scenes.iter().zip(scenes) {
             self.scene(&path.display().to_string(), scene, panels)?;
@@ -141,10 +141,10 @@ impl Bench<'_> {
     fn scene(&mut self, name: &str, scene: &Scene, panels: &mut Vec<Panel>) -> Result<(), Failure> {
         let settings = Settings::resolve(scene, &self.args.overrides());
         let area = u64::from(settings.size[0]) * u64::from(settings.size[1]);
-        // The reference, and the picture that is held against it.
+        // The reference, and the picture that is compared with it.
         memory::check(2 * area)?;
         let hash = scene_hash(scene, &settings);
-        // A picture that is given may be refused: before engines are made.
+        // Read the given reference first: it may be refused, and making engines takes time.
         let given = match &self.args.reference {
             Some(path) => Some(reference::given(path, &hash, settings.size)?),
             None => None,
@@ -153,7 +153,7 @@ impl Bench<'_> {
         let mut contenders = Vec::new();
         for kind in self.engines(&world) {
             self.progress
-                .share(0.0, &format!("{name}: making {}", kind.name()));
+                .share(0.0, &format!("{name}: preparing {}", kind.name()));
             contenders.push(self.contender(kind, &world, &settings)?);
         }
         let length = mean_path_length(scene, &settings, &self.signals.stop);
@@ -206,7 +206,7 @@ impl Bench<'_> {
         }
     }
 
-    /// The engines for this scene, each once.
+    /// The engines for this scene, without duplicates.
     fn engines(&self, world: &World) -> Vec<EngineKind> {
         let mut kinds = self.args.engine.clone();
         if kinds.is_empty() {
@@ -214,7 +214,7 @@ impl Bench<'_> {
                 .gpu
                 .as_ref()
                 .map(|gpu| EngineKind::with_access(Access::choose_for(world, gpu.info())));
-            // Beside it the reference, for a ratio; it is slow for the report's table.
+            // Add the CPU reference for comparison, except for the report's table, where it is too slow.
             if usual.is_none() || !self.args.report_table {
                 kinds.push(EngineKind::Cpu);
             }
@@ -237,7 +237,7 @@ impl Bench<'_> {
         })
     }
 
-    /// A reference made by the first engine that samples lights, or by one more that does.
+    /// A reference rendered by the first engine with light sampling, or by the CPU reference if there is none.
     fn make_reference(
         &mut self,
         name: &str,
@@ -280,7 +280,7 @@ impl Bench<'_> {
         }
     }
 
-    /// Prints a table: the data that was asked for, unless JSON on stdout was.
+    /// Prints a table to stdout, or to stderr if the JSON lines go to stdout.
     fn show(&mut self, text: &str) -> Result<(), Failure> {
         let json = self.args.json.as_deref().is_some_and(is_stdout);
         let quiet = self.args.talk.quiet;
@@ -294,7 +294,7 @@ impl Bench<'_> {
         })
     }
 
-    /// Writes what was asked for besides the tables.
+    /// Writes the JSON lines and the plots.
     fn write(&self, plots: &[(PathBuf, plot::Format)], panels: &[Panel]) -> Result<(), Failure> {
         if let Some(path) = &self.args.json {
             write_text(path, &self.json)?;
@@ -319,7 +319,7 @@ impl Bench<'_> {
     }
 }
 
-/// Each of them once, where it stood first.
+/// Removes duplicates and keeps the order.
 fn once(kinds: Vec<EngineKind>) -> Vec<EngineKind> {
     let mut once: Vec<EngineKind> = Vec::new();
     for kind in kinds {

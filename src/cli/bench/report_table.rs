@@ -12,7 +12,7 @@ use crate::world::World;
 use std::path::Path;
 use std::time::Duration;
 
-/// Rendering time of each engine and setting unless the user says.
+/// Default rendering time for each engine and setting.
 const TIME: Duration = Duration::from_secs(240);
 
 impl Bench<'_> {
@@ -35,7 +35,7 @@ impl Bench<'_> {
         let blank = figure9::blank(&cells);
         if !blank.is_empty() {
             self.progress.say(&format!(
-                "note: what is left blank would not be done within --time {} ({})",
+                "note: blank cells would take longer than --time {} ({})",
                 clock(self.time().as_secs_f64()),
                 blank.join(", ")
             ));

@@ -1,4 +1,4 @@
-//! `etendue bench --scaling`: seconds a path against the number of things.
+//! `etendue bench --scaling`: seconds per path against the number of objects.
 
 use super::{Bench, TIME, once};
 use crate::bench::plot::{Panel, ScalingPanel};
@@ -12,7 +12,7 @@ use crate::settings::Settings;
 use crate::world::World;
 
 impl Bench<'_> {
-    /// Every series; what there is to draw comes into `panels` whatever happens.
+    /// Measures every series. Adds its results to `panels` even if it ends early.
     pub(super) fn scaling(&mut self, panels: &mut Vec<Panel>) -> Result<(), Failure> {
         let plan = Plan {
             most: self.args.up_to as usize,
@@ -49,8 +49,8 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// The engines to compare, each once: those of the adapter, but none that its compiler is no match for even on this
-    /// small `world`.
+    /// The engines to compare, without duplicates. By default those of the adapter, except gpu-baked if the adapter's
+    /// compiler is too slow for it even on this small `world`.
     fn scaling_engines(&self, world: &World) -> Vec<EngineKind> {
         if !self.args.engine.is_empty() {
             return once(self.args.engine.clone());

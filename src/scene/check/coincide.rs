@@ -1,5 +1,5 @@
-//! Surfaces that coincide. The format says which of them is met first, so the picture is well defined. But the author rarely means it,
-//! unless one thing rests on another.
+//! Surfaces that coincide. The format defines which one a ray meets first, so the picture is well
+//! defined. But unless one object rests on another, coinciding surfaces are rarely intended.
 
 use super::{Warnings, called, is_dielectric};
 use crate::coincidence::{COINCIDENT, Flat};
@@ -45,7 +45,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
                 let (first, second) = if a_first { (a, b) } else { (b, a) };
                 warnings.add(second.place, || {
                     format!(
-                        "{} coincides with {}, which is met first from either side",
+                        "{} coincides with {}, which rays meet first from both sides",
                         called(second.kind, second.place.line),
                         called(first.kind, first.place.line),
                     )
@@ -96,7 +96,7 @@ fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
     let alike = both_opaque && a.material.is_some() && a.material == b.material;
     if let (Some(s), Some(t)) = (&a.shape, &b.shape)
         && s.curved_coincides(t, COINCIDENT)
-        // Overlapping pieces of one opaque material look the same, whichever is met.
+        // Overlapping parts of one opaque material look the same.
         && (!alike || same_length(s, t))
     {
         return Some((Rank::Curved, Rank::Curved));
@@ -112,7 +112,7 @@ fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
                 (Rank::Disk, Rank::Disk) => alike && !f.flat.same_disk(&g.flat),
                 // Flush on an opaque wall.
                 (Rank::Light | Rank::Disk, _) => both_opaque,
-                // One stands on the other, or both are parts of one thing.
+                // One stands on the other, or they are parts of one object.
                 (Rank::Cap, Rank::Cap) => {
                     let touch = opposite && !(a.dielectric && b.dielectric);
                     touch || alike
@@ -180,7 +180,7 @@ mod tests {
         let found = super::warnings(&scene(&text)).first;
         let first = with("").lines().count() + 1;
         let expected = format!(
-            "the plane at line {} coincides with the plane at line {first}, which is met first from either side",
+            "the plane at line {} coincides with the plane at line {first}, which rays meet first from both sides",
             first + 4
         );
         let place = Place {
@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn flush_and_standing_things_are_ordinary() {
+    fn flush_and_standing_objects_give_no_warning() {
         assert!(!suspect(FLOOR));
         for material in ["white", "red", "glass"] {
             let standing = cylinder("[0,0,0]", "[0,1,0]", 0.5, material);

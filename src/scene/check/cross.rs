@@ -1,4 +1,4 @@
-//! Dielectric solids whose surfaces cross. The medium of a ray that is inside both is undefined. Solids may nest, touch, or be apart.
+//! Dielectric solids whose surfaces cross: the medium inside both is undefined. Solids may nest, touch, or be apart.
 
 use super::geometry::{farthest_on_cylinder, points_on_disk, signed_distance, size};
 use super::{Warnings, called, is_dielectric};
@@ -16,7 +16,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
             if cross(&a.shape, &b.shape) {
                 warnings.add(b.place(), || {
                     format!(
-                        "{} crosses {}; both are dielectric, and what is inside both is undefined: \
+                        "{} crosses {}; both are dielectric, so the medium inside both is undefined: \
                      nest them or keep them apart",
                         called(b.shape.kind(), b.line),
                         called(a.shape.kind(), a.line)

@@ -25,14 +25,14 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
         let is_solid = !matches!(p.shape, Shape::Plane { .. });
         if touches(&p.shape) {
             warnings.add(p.place(), || {
-                format!("the eye is on the surface of {name}: its side is a matter of rounding")
+                format!("the eye is on the surface of {name}: rounding decides which side it is on")
             });
         } else if signed_distance(&p.shape, eye) >= 0.0 {
             continue;
         } else if let Bsdf::Dielectric { ior, .. } = scene.materials[p.material].bsdf {
             warnings.add(p.place(), || {
                 format!(
-                    "the eye is inside {name}: what it sees from outside is {:.4} times as bright \
+                    "the eye is inside {name}: light from outside appears {:.4} times as bright \
                  (ior squared)",
                     ior * ior
                 )
@@ -40,7 +40,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
         } else if is_solid && !holds_light(scene, &p.shape) {
             warnings.add(p.place(), || {
                 format!(
-                    "the eye is inside {name}, which is opaque and holds no light: it sees nothing"
+                    "the eye is inside {name}, which is opaque and contains no light: the picture is black"
                 )
             });
         }
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn eye_in_a_solid() {
-        assert!(warned(&ball(2.0, "white"), "it sees nothing"));
+        assert!(warned(&ball(2.0, "white"), "the picture is black"));
         assert!(!found(&ball(0.5, "white")), "outside");
         assert!(!found(&ball(50.0, "white")), "a room with the light in it");
         assert!(warned(&ball(2.0, "glass"), "2.3104 times as bright"));

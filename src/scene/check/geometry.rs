@@ -1,4 +1,4 @@
-//! Distances and hits in f64, for lints only. They decide nothing about the picture.
+//! Distances and hits in f64. Only the lints use them, never rendering.
 
 use crate::scene::{Light, Shape};
 use glam::DVec3;

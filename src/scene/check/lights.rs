@@ -1,4 +1,4 @@
-//! Lights that add no light to the picture.
+//! Lights that contribute nothing to the picture.
 
 use super::geometry::{disk_of, hit, points_on_disk, signed_distance};
 use super::{Warnings, called, is_dielectric};
@@ -17,7 +17,7 @@ pub(super) fn black(scene: &Scene) -> Warnings {
     for l in scene.lights.iter().filter(|l| l.radiance == DVec3::ZERO) {
         let light = called("light", l.line);
         warnings.add(l.place(), || {
-            format!("{light} has radiance 0: a black disk")
+            format!("{light} has radiance 0, so it is a black disk")
         });
     }
     warnings
@@ -52,7 +52,7 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
             let cover = called(kind, *line);
             warnings.add(l.place(), || {
                 format!(
-                    "{light} is covered: {cover} is before its front, within {COVER} of its radius"
+                    "{light} is covered: {cover} is in front of it, closer than {COVER} of its radius"
                 )
             });
         }
@@ -77,7 +77,7 @@ pub(super) fn unseen(scene: &Scene) -> Warnings {
             let light = called("light", l.line);
             let wall = called(p.shape.kind(), p.line);
             warnings.add(l.place(), || {
-                format!("{light} {how} {wall}, which is opaque: no light of it is seen")
+                format!("{light} {how} {wall}, which is opaque: none of its light reaches the eye")
             });
         }
     }
@@ -94,9 +94,9 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
             let height = normal.dot(l.center - point);
             let tilt = normal.cross(l.normal).length();
             if height + l.radius * tilt < -slack {
-                Some("is on the other side, seen from the eye, of")
+                Some("is hidden from the eye behind")
             } else if flush(normal, l, height) && normal.dot(l.normal) < 0.0 {
-                Some("lies flush on, and faces into,")
+                Some("lies on and faces into")
             } else {
                 None
             }
@@ -105,7 +105,7 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
             if signed_distance(shape, eye) < 0.0 {
                 return None;
             }
-            // Solids are convex, so a solid that holds the rim holds the disk.
+            // Solids are convex: they contain the disk if they contain its rim.
             let (x, y) = l.normal.any_orthonormal_pair();
             let mut rim = (0..POINTS).map(|k| {
                 let turn = k as f64 / POINTS as f64 * std::f64::consts::TAU;
@@ -114,7 +114,7 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
             if rim.all(|p| signed_distance(shape, p) < -slack) {
                 return Some("is inside");
             }
-            faces_into_cap(shape, l, slack).then_some("lies flush on, and faces into,")
+            faces_into_cap(shape, l, slack).then_some("lies on and faces into")
         }
         Shape::Disk { .. } => None,
     }
@@ -218,7 +218,7 @@ mod tests {
         let hidden = plane("[0,0,2]", "[0,0,1]", "white");
         assert!(warned(
             &hidden,
-            "is on the other side, seen from the eye, of the plane at line"
+            "is hidden from the eye behind the plane at line"
         ));
     }
 

@@ -1,4 +1,4 @@
-//! Scenes that rays leave.
+//! Open scenes: rays can leave them.
 
 use super::geometry::{directions, disk_of, hit};
 use super::{Warnings, is_dielectric};
@@ -29,7 +29,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
         warnings.add(Place::default(), || {
             format!(
                 "the scene is open: {leaving} of {rays} rays from the eye in all directions leave \
-                 it, and carry no light"
+                 it and carry no light"
             )
         });
     }

@@ -1,0 +1,5 @@
+// Mirror reflection.
+
+fn sample_mirror(x: Interaction, u: Draws) -> Scattered {
+    return Scattered(mirrored(-x.wo, x.n), x.material.color, 0.0, true, x.medium);
+}

@@ -1,0 +1,18 @@
+// Branches, for kernels that loop over buffers or walk through trees: their long calls are worth skipping, and SwiftShader's
+// compiler, which gets only these, takes minutes over long blocks of straight code.
+
+fn scatter_if(meets: bool, path: ptr<function, Path>, hit: Hit, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) -> bool {
+    var lives = false;
+    if meets {
+        lives = scatter(path, true, hit, pixel, sight, film);
+    }
+    return lives;
+}
+
+fn direct_light_if(asks: bool, x: Interaction, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
+    var direct: DirectLight;
+    if asks {
+        direct = direct_light(true, x, to, key, u, depth, film);
+    }
+    return direct;
+}

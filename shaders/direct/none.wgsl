@@ -1,0 +1,15 @@
+// No light sampling: there is no light, or nothing that scatters into more than one direction, or nothing is kept of such light.
+
+struct DirectLight {
+    radiance: vec3f,
+    weights: f32,
+}
+
+fn direct_light(asks: bool, x: Interaction, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
+    return DirectLight(vec3f(0.0), 0.0);
+}
+
+// Light met by chance counts in full.
+fn chance_weight(path: Path, light: DiskLight, index: u32) -> f32 {
+    return 1.0;
+}

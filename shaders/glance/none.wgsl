@@ -1,0 +1,40 @@
+// No glances: no light can be seen by the eye, directly or in mirrors and glass.
+
+const MARK_WORDS: u32 = 0u;
+
+struct Sight {
+    glances: u32,
+    across: u32,
+}
+
+fn sight_of(mark: u32) -> Sight {
+    return Sight(0u, 1u);
+}
+
+fn is_glance(path: Path) -> bool {
+    return false;
+}
+
+fn sees_lights(path: Path, sight: Sight) -> bool {
+    return true;
+}
+
+fn share_of_light(path: Path, sight: Sight) -> f32 {
+    return 1.0;
+}
+
+fn looks_on(path: Path, sight: Sight) -> bool {
+    return true;
+}
+
+fn glances_after(path: Path, sight: Sight) -> u32 {
+    return 0u;
+}
+
+fn vertex_seed(path: Path) -> u32 {
+    return params.seed;
+}
+
+fn way_at_glass(path: Path, pixel: Pixel, s: u32, sight: Sight) -> u32 {
+    return BY_CHANCE;
+}

@@ -1,0 +1,19 @@
+// Receivers of light in scenes without glossy materials.
+
+// What lights are chosen for at some point: its normal there.
+struct Receiver {
+    n: vec3f,
+}
+
+fn receiver_at(x: Interaction) -> Receiver {
+    return Receiver(x.n);
+}
+
+// How much of the light of things in a ball it scatters, up to a factor: see receiver_glossy.wgsl.
+fn scattered(at: Receiver, to: vec3f, inverse: f32, radius: f32) -> f32 {
+    return 1.0;
+}
+
+fn sample_light(light: DiskLight, cap: Cap, at: Receiver, u: vec2f, choice: f32) -> LightSample {
+    return sample_cap(light, cap, u);
+}

@@ -1,0 +1,44 @@
+// A walk through a tree of spheres, whose nodes hold the spheres themselves: one costs no more than a box, and needs no visit of its own.
+// A template: src/kernel/trees.rs fills in the names that begin with a dollar sign, once for the nearest hit and once for shadow rays.
+
+fn $walk(ray: Ray, first: Hit) -> Hit {
+    var hit = first;
+    let slabs = slabs_of(ray, bitcast<f32>(record($header).x));
+    var at = Place(1u, 0u);
+    while at.node != 0u && $goes_on trips_left > 0u {
+        trips_left -= 1u;
+        // Two visits a trip: the trips that older drivers grant go farther, and it costs nothing.
+        at = $walk_visit(ray, slabs, at, &hit);
+        at = $walk_visit(ray, slabs, at, &hit);
+    }
+    return hit;
+}
+
+fn $walk_visit(ray: Ray, slabs: Slabs, at: Place, hit: ptr<function, Hit>) -> Place {
+    let place = four_records($nodes + at.node);
+    let a = textureLoad(records, place);
+    let b = textureLoad(records, place + vec2u(1u, 0u));
+    let c = textureLoad(records, place + vec2u(2u, 0u));
+    let low_0 = bitcast<vec3f>(a.xyz);
+    let high_0 = bitcast<vec3f>(vec3u(a.w, b.xy));
+    let low_1 = bitcast<vec3f>(vec3u(b.zw, c.x));
+    let high_1 = bitcast<vec3f>(c.yzw);
+    let solids = textureLoad(records, place + vec2u(3u, 0u));
+    let leaf_0 = b.y == LEAF;
+    if leaf_0 {
+        let item = b.x;
+        let i = (item >> 1u) - 1u;
+        let sphere = Sphere(low_0, bitcast<f32>(a.w));
+        *hit = $keep(*hit, $call_0, item);
+    }
+    let leaf_1 = c.w == LEAF;
+    if leaf_1 {
+        let item = c.z;
+        let i = (item >> 1u) - 1u;
+        let sphere = Sphere(low_1, bitcast<f32>(c.y));
+        *hit = $keep(*hit, $call_1, item);
+    }
+    let entry_0 = select(box_entry(slabs, low_0, high_0, hit.t), MISSED, leaf_0);
+    let entry_1 = select(box_entry(slabs, low_1, high_1, hit.t), MISSED, leaf_1);
+    return onward(at, entry_0, entry_1);
+}

@@ -1,0 +1,80 @@
+// Walking a bounding volume hierarchy without a stack: node k has the children 2k and 2k + 1, and one bit for each level says
+// whether the sibling of the node there is still to be visited. The walk itself is generated for each kind of surface.
+
+// Each node has four records. The first three are twelve words, six for each child. Those of a box are
+//   its least corner, its greatest corner.
+// Of spheres the sixth word is LEAF, and the others are
+//   centre, radius, 2 (number of the surface + 1), + 1 if it can block light;
+// where they bound solids the fourth record has solid and parent of both children. Of other surfaces each has a node of its own,
+// whose twelfth word is LEAF and whose first is that number; of disks
+//   centre, radius; normal, offset; that number, face, 0, LEAF.
+// Before each tree: farthest from the origin that it
+// reaches. Node 0 has two boxes that nothing meets: where a walk goes when it is done.
+const LEAF: u32 = 0xffffffffu;
+
+// Farther than anything.
+const MISSED: f32 = 1.0e38;
+
+// Loop trips left to the invocation: see trips/counted.wgsl. When none are left the walk is no use, and the sample begins again in the
+// next dispatch.
+var<private> trips_left: u32 = 0xffffffffu;
+
+// A ray made ready for boxes.
+struct Slabs {
+    // Its origin, moved by what rounding may do to it or to a hit: against the sides that it enters by, and that it leaves
+    // by. The walk must not miss what a loop over all surfaces would meet.
+    enter: vec3f,
+    leave: vec3f,
+    inverse: vec3f,
+    backwards: vec3<bool>,
+}
+
+fn slabs_of(ray: Ray, reach: f32) -> Slabs {
+    // Components of either zero, and those that might as well be, become large numbers of either sign.
+    let d = select(ray.d, vec3f(1.0e-20), abs(ray.d) < vec3f(1.0e-20));
+    let inverse = 1.0 / d;
+    let backwards = d < vec3f(0.0);
+    // Sixteen units in the last place.
+    let slack = 1.0e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z) + reach);
+    let against = select(vec3f(slack), vec3f(-slack), backwards);
+    return Slabs(ray.o + against, ray.o - against, inverse, backwards);
+}
+
+// Where the ray enters the box, if no farther than t, else MISSED.
+fn box_entry(s: Slabs, low: vec3f, high: vec3f, t: f32) -> f32 {
+    let enter = (select(low, high, s.backwards) - s.enter) * s.inverse;
+    let leave = (select(high, low, s.backwards) - s.leave) * s.inverse;
+    let near = fmax(fmax(enter.x, enter.y), fmax(enter.z, 0.0));
+    let far = fmin(fmin(leave.x, leave.y), fmin(leave.z, t));
+    // Distances have errors of their own.
+    return select(MISSED, near, near * 0.99999 <= far);
+}
+
+// Where a walk is: a node, and for each level, the lowest bit its own, whether the sibling there is still to be visited.
+struct Place {
+    node: u32,
+    siblings: u32,
+}
+
+// Goes on to the nearer child that is met, or else to the last sibling that was put off.
+fn onward(at: Place, entry_0: f32, entry_1: f32) -> Place {
+    let second = entry_1 < entry_0;
+    let met = fmin(entry_0, entry_1) < MISSED;
+    let both = fmax(entry_0, entry_1) < MISSED;
+    let levels = firstTrailingBit(at.siblings | 0x80000000u);
+    let node = select((at.node >> levels) ^ 1u, 2u * at.node + u32(second), met);
+    let siblings = select((at.siblings >> levels) ^ 1u, 2u * at.siblings + u32(both), met);
+    let over = !met && at.siblings == 0u;
+    return Place(select(node, 0u, over), select(siblings, 0u, over));
+}
+
+// The nearer of two hits. Trees are walked in any order: of equals the one with the lower key comes first in the scene.
+fn keep_nearest(hit: Hit, found: Hit, item: u32) -> Hit {
+    let take = found.t < hit.t || (found.t == hit.t && found.key < hit.key);
+    return Hit(select(hit.t, found.t, take), select(hit.key, found.key, take));
+}
+
+// What a shadow ray has met, if the surface of `item` can block light at all.
+fn keep_blocker(hit: Hit, found: Hit, item: u32) -> Hit {
+    return Hit(hit.t, select(hit.key, found.key, (item & 1u) == 1u));
+}

@@ -1,0 +1,90 @@
+//! `choose_light` where a line of code for each light chooses among them, and `light_scale`.
+
+use super::super::features::{Features, LightChoice};
+use super::super::layout::DiskLight;
+use super::super::literal::float;
+use crate::world::World;
+use std::fmt::Write as _;
+
+/// Chooses one light with probability in proportion to its weight; nothing where a module of the shaders does.
+pub(in crate::kernel) fn choose(world: &World, features: &Features) -> String {
+    const HEAD: &str = "fn choose_light(p: vec3f, to: Receiver, u: vec2f) -> Chosen {\n";
+    match features.choice {
+        LightChoice::Loop | LightChoice::Tree => String::new(),
+        LightChoice::Only => {
+            let light = DiskLight::of(&world.lights[0]).constructor();
+            // Images are chosen against the light's own weight.
+            let weight = if features.images {
+                "light_weight(light, p, to)"
+            } else {
+                "1.0"
+            };
+            format!(
+                "{HEAD}    let light = {light};
+    return Chosen(light, 0u, cap_of(light, p), 1.0, {weight});
+}}
+
+"
+            )
+        }
+        LightChoice::Unrolled => {
+            // All weights stay in registers; the first partial sum above u times the whole chooses.
+            let mut s = String::from(HEAD);
+            let mut before = String::new();
+            for (i, l) in world.lights.iter().enumerate() {
+                let light = DiskLight::of(l).constructor();
+                let _ = write!(
+                    s,
+                    "    let w_{i} = light_weight({light}, p, to);
+    let sum_{i} = {before}w_{i};
+"
+                );
+                before = format!("sum_{i} + ");
+            }
+            let last = world.lights.len() - 1;
+            let _ = write!(
+                s,
+                "    let sum = sum_{last};
+    let at = u.x * sum;
+    var index = 0u;
+    var chosen = w_0;
+"
+            );
+            for i in 1..=last {
+                let before = i - 1;
+                let _ = write!(
+                    s,
+                    "    index = select(index, {i}u, at >= sum_{before});
+    chosen = select(chosen, w_{i}, at >= sum_{before});
+"
+                );
+            }
+            s + "    let light = light_at(index);
+    return Chosen(light, index, cap_of(light, p), select(sum / fmax(chosen, TINY), 0.0, chosen <= 0.0), sum);
+}
+
+"
+        }
+    }
+}
+
+/// See [`World::light_scales`]. Media that follow each other with one scale make one line.
+pub(in crate::kernel) fn scale(world: &World) -> String {
+    let Some(scales) = &world.light_scales else {
+        return "fn light_scale(medium: u32) -> f32 {\n    return 1.0;\n}\n\n".to_owned();
+    };
+    let mut s = format!(
+        "fn light_scale(medium: u32) -> f32 {{\n    var scale = {};\n",
+        float(scales[0])
+    );
+    let mut first = 1;
+    for run in scales[1..].chunk_by(|a, b| a == b) {
+        let (x, last) = (float(run[0]), first + run.len() - 1);
+        let _ = writeln!(
+            s,
+            "    scale = select(scale, {x}, medium >= {first}u && medium <= {last}u);"
+        );
+        first = last + 1;
+    }
+    s + "    return scale;\n}\n\n"
+}

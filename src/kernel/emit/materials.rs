@@ -1,0 +1,95 @@
+//! Dispatch over the materials of a scene: `is_NAME`, `sample_bsdf`, `evaluate_bsdf`.
+
+use super::super::access::Access;
+use super::super::features::Features;
+use super::super::layout::MaterialKind;
+use std::fmt::Write as _;
+
+/// The two functions.
+pub(in crate::kernel) fn dispatch(features: &Features) -> String {
+    let mut s = String::new();
+    let all: Vec<MaterialKind> = features.materials().collect();
+    s.push_str(&over(
+        features,
+        "sample",
+        "fn sample_bsdf(x: Interaction, u: Draws) -> Scattered",
+        "(x, u)",
+        "Scattered",
+        &all,
+    ));
+    if features.light_sampling {
+        let scattering: Vec<MaterialKind> = all.into_iter().filter(|m| !m.specular()).collect();
+        s.push_str(&over(
+            features,
+            "evaluate",
+            "fn evaluate_bsdf(x: Interaction, wi: vec3f) -> BsdfValue",
+            "(x, wi)",
+            "BsdfValue",
+            &scattering,
+        ));
+    }
+    s
+}
+
+/// `is_NAME(material)` of every kind: false where the scene has none, true where it has no other.
+pub(in crate::kernel) fn predicates(features: &Features) -> String {
+    let mut s = String::new();
+    for kind in MaterialKind::ALL {
+        let value = match (features.has_material(kind), features.materials().count()) {
+            (false, _) => "false".to_owned(),
+            (true, 1) => "true".to_owned(),
+            (true, _) => format!("material.kind == MATERIAL_{}", kind.name().to_uppercase()),
+        };
+        let _ = writeln!(
+            s,
+            "fn is_{}(material: Material) -> bool {{\n    return {value};\n}}\n",
+            kind.name()
+        );
+    }
+    s
+}
+
+/// A function that has each of these materials do its part.
+fn over(
+    features: &Features,
+    verb: &str,
+    head: &str,
+    arguments: &str,
+    result: &str,
+    kinds: &[MaterialKind],
+) -> String {
+    let call = |kind: &MaterialKind| format!("{verb}_{}{arguments}", kind.name());
+    let mut s = format!("{head} {{\n");
+    match (kinds, features.access) {
+        ([], _) => {
+            let _ = writeln!(s, "    return {result}();");
+        }
+        ([only], _) => {
+            let _ = writeln!(s, "    return {};", call(only));
+        }
+        // Straight code: all of them, and a selection.
+        ([first, rest @ ..], Access::Baked) => {
+            let _ = writeln!(s, "    var r = {};", call(first));
+            for kind in rest {
+                let (call, name) = (call(kind), kind.name());
+                let _ = writeln!(
+                    s,
+                    "    r = select_{verb}d(r, {call}, is_{name}(x.material));"
+                );
+            }
+            s.push_str("    return r;\n");
+        }
+        (kinds, Access::Buffers | Access::Tree) => {
+            let _ = writeln!(s, "    var r: {result};");
+            for kind in kinds {
+                let (call, name) = (call(kind), kind.name());
+                let _ = writeln!(
+                    s,
+                    "    if is_{name}(x.material) {{\n        r = {call};\n    }}"
+                );
+            }
+            s.push_str("    return r;\n");
+        }
+    }
+    s + "}\n\n"
+}

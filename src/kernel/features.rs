@@ -1,0 +1,346 @@
+//! What the kernel of a scene needs, decided once from world and settings.
+
+use super::access::Access;
+use super::layout::{MaterialKind, ShapeKind};
+use super::literal::{float, vector};
+use super::{glances, images};
+use crate::film::{BLOCK, REPLICATES};
+use crate::settings::{Integrator, LightParts, Settings};
+use crate::world::{
+    AIR, Geometry, World, WorldCamera, WorldPrimitive, light_tree, near_light, visibility,
+};
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::ops::RangeInclusive;
+
+/// Pixels along a side of the block that a workgroup is.
+pub(crate) const GROUP_SIDE: u32 = 8;
+
+/// The fourth powers of radii outside this range come near the ends of f32.
+const ORDINARY_RADII: RangeInclusive<f64> = 1e-8..=1e8;
+
+/// How one of the lights is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LightChoice {
+    /// There is one.
+    Only,
+    /// By a line of code for each.
+    Unrolled,
+    /// By a loop over them.
+    Loop,
+    /// Down a tree of clusters.
+    Tree,
+}
+
+/// A name that `#if` knows in the shaders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Flag {
+    /// There are cylinders.
+    Cylinder,
+    /// There are planes, disks, or cylinders with their caps.
+    Flat,
+    /// There are spheres or cylinders.
+    Round,
+    /// There are huge spheres.
+    HugeSphere,
+    /// A light lies flush on a cylinder's cap.
+    LitCaps,
+    /// Some light's radius is out of the ordinary.
+    ExtremeLights,
+}
+
+impl Flag {
+    const ALL: [Self; 6] = [
+        Self::Cylinder,
+        Self::Flat,
+        Self::Round,
+        Self::HugeSphere,
+        Self::LitCaps,
+        Self::ExtremeLights,
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Cylinder => "CYLINDER",
+            Self::Flat => "FLAT",
+            Self::Round => "ROUND",
+            Self::HugeSphere => "HUGE_SPHERE",
+            Self::LitCaps => "LIT_CAPS",
+            Self::ExtremeLights => "EXTREME_LIGHTS",
+        }
+    }
+
+    /// The flag with this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|f| f.name() == name)
+    }
+}
+
+/// What a kernel needs.
+#[derive(Debug, Clone)]
+pub(super) struct Features {
+    /// How it reaches the scene's values.
+    pub access: Access,
+    materials: BTreeSet<MaterialKind>,
+    shapes: BTreeSet<ShapeKind>,
+    lit_caps: bool,
+    extreme_lights: bool,
+    /// Lights are sampled.
+    pub light_sampling: bool,
+    /// How one of them is chosen.
+    pub choice: LightChoice,
+    /// Some of them overlap in one plane.
+    pub hidden_lights: bool,
+    /// Light samples at a vertex.
+    pub shadow_rays: u32,
+    /// Diffuse bounces that meet a light by chance are weighed against light sampling.
+    mis_diffuse: bool,
+    /// Images of lights in mirror balls are sought.
+    pub images: bool,
+    /// The last vertex at which glances look for lights; 0: none are sent.
+    pub sight: u32,
+    /// Strata along a pixel's side.
+    pub strata: u32,
+    /// Number of the last vertex that can matter, for the light that is kept.
+    pub last_depth: u32,
+    /// Some paths are cut there that could still find light.
+    count_truncated: bool,
+}
+
+impl Features {
+    /// Those of the kernel of `world` under `settings`, which reaches the scene's values by `access`.
+    pub fn new(world: &World, settings: &Settings, access: Access) -> Self {
+        let used = || {
+            world
+                .primitives
+                .iter()
+                .map(|p| &world.materials[p.material])
+        };
+        let materials: BTreeSet<MaterialKind> = used().map(MaterialKind::of).collect();
+        let shapes = world.primitives.iter().map(|p| ShapeKind::of(&p.geometry));
+        let lit = |p: &WorldPrimitive| {
+            let caps = matches!(p.geometry, Geometry::Cylinder { .. }).then_some(&p.faces[1..]);
+            let mut faces = caps.into_iter().flatten();
+            faces.any(|f| world.lights.iter().any(|l| l.face == *f))
+        };
+        let last_depth = last_depth(settings);
+        let scatters = materials.iter().any(|m| !m.specular());
+        let light_sampling = last_depth > 1 && !world.lights.is_empty() && scatters;
+        let diffuse = materials.contains(&MaterialKind::Diffuse);
+        let choice = match (world.lights.len(), access) {
+            (0 | 1, _) => LightChoice::Only,
+            (_, Access::Baked) => LightChoice::Unrolled,
+            (_, Access::Buffers) => LightChoice::Loop,
+            (lights, Access::Tree) if light_tree::serves(lights) => LightChoice::Tree,
+            // Lights too few for a tree of their own are chosen as in a small scene.
+            (_, Access::Tree) => LightChoice::Unrolled,
+        };
+        Self {
+            access,
+            shapes: shapes.collect(),
+            lit_caps: world.primitives.iter().any(lit),
+            extreme_lights: world
+                .lights
+                .iter()
+                .any(|l| !ORDINARY_RADII.contains(&l.radius)),
+            light_sampling,
+            choice,
+            hidden_lights: light_sampling && visibility::lights_overlap(world),
+            shadow_rays: settings.shadow_rays,
+            // What a cosine-distributed bounce finds of a light, cap sampling finds as well, unless it is near.
+            mis_diffuse: light_sampling && diffuse && near_light::light_near_diffuse(world),
+            images: !images::of(world, settings, access).is_empty(),
+            sight: glances::sight(world, settings, access),
+            strata: settings.strata,
+            last_depth,
+            count_truncated: settings.max_depth < needed_depth(settings),
+            materials,
+        }
+    }
+
+    /// Those of a probe, which has every shape and material but no scene.
+    pub fn of_probe(probe: &super::ProbeFeatures) -> Self {
+        Self {
+            access: Access::Baked,
+            materials: MaterialKind::ALL.into_iter().collect(),
+            shapes: ShapeKind::ALL.into_iter().collect(),
+            lit_caps: false,
+            extreme_lights: false,
+            light_sampling: probe.glossy,
+            choice: LightChoice::Unrolled,
+            hidden_lights: false,
+            shadow_rays: 1,
+            mis_diffuse: true,
+            images: probe.images,
+            sight: 0,
+            strata: probe.strata,
+            last_depth: 64,
+            count_truncated: false,
+        }
+    }
+
+    pub fn has_material(&self, kind: MaterialKind) -> bool {
+        self.materials.contains(&kind)
+    }
+
+    /// In the order of their tags.
+    pub fn materials(&self) -> impl Iterator<Item = MaterialKind> {
+        self.materials.iter().copied()
+    }
+
+    pub fn has_shape(&self, kind: ShapeKind) -> bool {
+        self.shapes.contains(&kind)
+    }
+
+    /// Whether lights are sampled for lobes.
+    pub fn glossy(&self) -> bool {
+        self.light_sampling && self.has_material(MaterialKind::Phong)
+    }
+
+    /// Whether light met by chance is weighed against light sampling anywhere.
+    fn mis(&self) -> bool {
+        self.glossy() || self.mis_diffuse
+    }
+
+    /// Whether its lines of the shaders count.
+    pub fn flag(&self, flag: Flag) -> bool {
+        let any = |kinds: &[ShapeKind]| kinds.iter().any(|k| self.has_shape(*k));
+        match flag {
+            Flag::Cylinder => any(&[ShapeKind::Cylinder]),
+            Flag::Flat => any(&[ShapeKind::Plane, ShapeKind::Disk, ShapeKind::Cylinder]),
+            Flag::Round => any(&[
+                ShapeKind::Cylinder,
+                ShapeKind::Sphere,
+                ShapeKind::HugeSphere,
+            ]),
+            Flag::HugeSphere => any(&[ShapeKind::HugeSphere]),
+            Flag::LitCaps => self.lit_caps,
+            Flag::ExtremeLights => self.extreme_lights,
+        }
+    }
+
+    /// The constants of the shaders, but for those of one scene's camera and lights.
+    pub fn constants(&self) -> String {
+        let mut s = String::new();
+        for kind in MaterialKind::ALL {
+            let name = kind.name().to_uppercase();
+            constant(
+                &mut s,
+                &format!("MATERIAL_{name}"),
+                "u32",
+                format!("{}u", kind as u32),
+            );
+        }
+        for kind in ShapeKind::ALL {
+            let name = kind.name().to_uppercase();
+            constant(
+                &mut s,
+                &format!("SHAPE_{name}"),
+                "u32",
+                format!("{}u", kind as u32),
+            );
+        }
+        let round = self.strata * self.strata;
+        for (name, value) in [
+            ("BLOCK", BLOCK as u32),
+            ("REPLICATES", REPLICATES as u32),
+            ("STRATA", self.strata),
+            ("ROUND_SAMPLES", round),
+            ("LAST_DEPTH", self.last_depth),
+            ("GROUP_SIDE", GROUP_SIDE),
+        ] {
+            constant(&mut s, name, "u32", format!("{value}u"));
+        }
+        for (name, value) in [
+            ("GLOSSY", self.glossy()),
+            ("MIS", self.mis()),
+            ("MIS_DIFFUSE", self.mis_diffuse),
+            ("COUNT_TRUNCATED", self.count_truncated),
+            ("GLANCE_CHAINS", self.sight > 1),
+        ] {
+            constant(&mut s, name, "bool", value.to_string());
+        }
+        constant(
+            &mut s,
+            "SHADOW_RAYS",
+            "f32",
+            float(f64::from(self.shadow_rays)),
+        );
+        constant(
+            &mut s,
+            "LIGHT_COLORS",
+            "vec3f",
+            vector(light_tree::LIGHT_COLORS),
+        );
+        if self.images {
+            constant(
+                &mut s,
+                "MIRROR_BITS",
+                "u32",
+                format!("{}u", images::MIRROR_BITS),
+            );
+        }
+        s
+    }
+
+    /// The constants of one scene.
+    pub fn scene_constants(&self, world: &World, settings: &Settings) -> String {
+        let mut s = camera_constants(&world.camera, settings.size);
+        let parts = settings.light;
+        for (name, value) in [
+            ("ALL_LIGHT", parts == LightParts::ALL),
+            ("KEEP_EMITTED", parts.emitted),
+            ("KEEP_DIRECT", parts.direct),
+            ("KEEP_INDIRECT", parts.indirect),
+            ("WHITTED", settings.integrator == Integrator::Whitted),
+        ] {
+            constant(&mut s, name, "bool", value.to_string());
+        }
+        for (name, value) in [
+            ("LIGHT_KEYS", 4 * world.lights.len() as u32),
+            ("LIGHT_COUNT", world.lights.len() as u32),
+            ("GLANCES", glances::GLANCES),
+            ("CHAIN_GLANCES", glances::in_chains(settings)),
+            ("BRANCH_SHIFT", glances::BRANCH_SHIFT),
+            ("DIRECT_SHIFT", glances::DIRECT_SHIFT),
+        ] {
+            constant(&mut s, name, "u32", format!("{value}u"));
+        }
+        s
+    }
+}
+
+pub(super) fn constant(s: &mut String, name: &str, kind: &str, value: String) {
+    let _ = writeln!(s, "const {name}: {kind} = {value};");
+}
+
+fn camera_constants(c: &WorldCamera, size: [u32; 2]) -> String {
+    let mut s = String::new();
+    for (name, value) in [
+        ("CAMERA_EYE", c.eye),
+        ("CAMERA_FORWARD", c.forward),
+        ("CAMERA_DX", c.dx),
+        ("CAMERA_DY", c.dy),
+    ] {
+        constant(&mut s, name, "vec3f", vector(value));
+    }
+    let [w, h] = size.map(|n| float(f64::from(n) / 2.0));
+    constant(&mut s, "CAMERA_CENTER", "vec2f", format!("vec2f({w}, {h})"));
+    constant(&mut s, "CAMERA_MEDIUM", "u32", format!("{}u", c.medium));
+    debug_assert_eq!(AIR, 0, "the kernel's comments say so");
+    s
+}
+
+/// Number of the last vertex that can matter, for the light that is kept.
+pub(super) fn last_depth(settings: &Settings) -> u32 {
+    settings.max_depth.min(needed_depth(settings))
+}
+
+/// Vertices beyond which none of the light that is kept can be found.
+fn needed_depth(settings: &Settings) -> u32 {
+    match settings.light {
+        LightParts { indirect: true, .. } => u32::MAX,
+        LightParts { direct: true, .. } => 2,
+        _ => 1,
+    }
+}

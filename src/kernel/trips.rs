@@ -1,0 +1,127 @@
+//! Loop trips of old Mesa: the host's part.
+//!
+//! Mesa's llvmpipe lets the loops of an invocation go round 65 535 times in all, and then ends every loop in silence (seen with 22.3,
+//! not with 25.0). So kernels without trees get no more samples in a dispatch than [`Kernel::trips_per_sample`] allows, and kernels
+//! with trees count their trips: see `shaders/trips/`. Delete this file, `shaders/trips/counted.wgsl` and what they are called by when
+//! Mesa 22 is gone.
+//!
+//! [`Kernel::trips_per_sample`]: super::Kernel::trips_per_sample
+
+use super::access::Access;
+use super::features::Features;
+use super::glances::MAX_GLANCES;
+use super::trees::Parted;
+use crate::settings::Settings;
+use crate::world::{World, light_tree, visibility};
+
+/// The most loop trips that an invocation may take on this adapter. A driver without a version is taken for old.
+pub(crate) fn limit(adapter: &str, driver: &str) -> u64 {
+    let llvmpipe = adapter.to_lowercase().contains("llvmpipe");
+    let mesa = driver
+        .split("Mesa ")
+        .nth(1)
+        .and_then(|v| v.split('.').next())
+        .and_then(|v| v.parse::<u32>().ok());
+    if llvmpipe && mesa.is_none_or(|v| v < 25) {
+        65_000
+    } else {
+        u64::from(u32::MAX)
+    }
+}
+
+/// What is wrong where a path may take more trips than there are.
+pub(crate) fn too_many(path: &str, trips: u64, advice: &str) -> String {
+    format!(
+        "{path} {trips} loop iterations{advice}, but this driver silently stops an invocation at 65535; lower max_depth or use --backend cpu"
+    )
+}
+
+/// The loop trips that a vertex can take of an invocation; but for walks through the trees of `parted`, which count theirs.
+pub(super) fn at_vertex(
+    world: &World,
+    settings: &Settings,
+    access: Access,
+    parted: Option<&Parted>,
+) -> u64 {
+    // Loops over all surfaces for a ray, and over all lights to choose one.
+    let (ray, choice) = match access {
+        Access::Baked => (0, 0),
+        Access::Buffers => (world.surface_count() as u64, world.lights.len() as u64),
+        // Surfaces without bounds, if they are many; down the light tree and up again.
+        Access::Tree => (
+            parted.map_or(0, |p| p.apart.len() as u64),
+            2 * u64::from(light_tree::levels(world.lights.len())),
+        ),
+    };
+    // Every vertex: nearest hit, and for each shadow ray a choice and a ray.
+    let shadow_rays = u64::from(settings.shadow_rays);
+    let inner = ray + shadow_rays * (choice + ray);
+    let shadow_loop = if shadow_rays > 1 { shadow_rays } else { 0 };
+    let hidden = if visibility::lights_overlap(world) {
+        shadow_rays * world.lights.len() as u64
+    } else {
+        0
+    };
+    1 + inner + shadow_loop + hidden
+}
+
+/// The loop trips that the choice of a place in the pixel can take.
+const STRATA_LOOP: u64 = 32;
+
+/// Those that loading and storing a pixel's numbers takes: three, four and four.
+const LOOPS_AROUND: u64 = 11;
+
+/// The most that one sample can take; 0 where the kernel counts.
+pub(super) fn per_sample(world: &World, settings: &Settings, features: &Features) -> u64 {
+    if features.access == Access::Tree {
+        return 0;
+    }
+    // While one lane glances another may do all that a vertex asks for.
+    let turns = u64::from(features.last_depth) + u64::from(MAX_GLANCES * features.sight);
+    let trips = turns
+        .saturating_mul(at_vertex(world, settings, features.access, None))
+        .saturating_add(STRATA_LOOP + LOOPS_AROUND);
+    // The loop of vertices is inside another one where images are sought, which goes round no more often.
+    trips + if features.images { turns } else { 0 }
+}
+
+/// What a kernel that counts takes off before its first sample, and at each vertex.
+pub(super) fn counted(
+    world: &World,
+    settings: &Settings,
+    features: &Features,
+    parted: &Parted,
+) -> [u64; 2] {
+    let glances = u64::from(MAX_GLANCES * features.sight);
+    let start = glances + STRATA_LOOP + LOOPS_AROUND;
+    [
+        start,
+        at_vertex(world, settings, features.access, Some(parted)),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::limit;
+
+    #[test]
+    fn old_mesa_alone_is_limited() {
+        let all = u64::from(u32::MAX);
+        assert_eq!(
+            limit(
+                "llvmpipe (LLVM 15.0.6, 256 bits)",
+                "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)"
+            ),
+            65_000
+        );
+        assert_eq!(
+            limit(
+                "llvmpipe (LLVM 19.1.7, 512 bits)",
+                "Mesa 25.0.7-2 (LLVM 19.1.7)"
+            ),
+            all
+        );
+        assert_eq!(limit("llvmpipe", "unknown"), 65_000);
+        assert_eq!(limit("NVIDIA H200", "580.159.04"), all);
+    }
+}
