@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 /// Surfaces closer than this, relative to their size, coincide. Angles between normals are held to the same number.
-pub const COINCIDENT: f64 = 1e-6;
+pub(crate) const COINCIDENT: f64 = 1e-6;
 
 /// A wider tolerance that finds all surfaces that may coincide: two surfaces may do so by way of a third.
 pub(crate) const MAY_COINCIDE: f64 = 4.0 * COINCIDENT;

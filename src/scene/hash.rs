@@ -22,7 +22,7 @@ pub fn scene_hash(scene: &Scene, settings: &Settings) -> String {
     hash_of(&Canonical::new(scene), settings)
 }
 
-/// The same as [`scene_hash`], of a scene that is in its one order.
+/// The same as [`scene_hash`], of a scene in canonical order.
 pub fn hash_of(scene: &Canonical, settings: &Settings) -> String {
     let mut h = Hasher(Sha256::new_with_prefix("etendue scene 2\0"));
     let scene = scene.scene();

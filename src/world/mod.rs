@@ -25,10 +25,8 @@ mod tree;
 pub(crate) mod visibility;
 
 pub use geometry::Geometry;
-pub use light_tree::MOST_LOOKED_AT;
+pub use light_tree::MAX_SCANNED_LIGHTS;
 pub use tree::{Bounds, Node, Tree};
-
-pub use crate::coincidence::COINCIDENT;
 
 use crate::coincidence::slack;
 use crate::scene::{Bsdf, Canonical, Scene};
@@ -148,7 +146,7 @@ impl World {
         Self::of(&Canonical::new(scene), size)
     }
 
-    /// The same as [`World::new`], of a scene that is in its one order. The world depends on the order of the file only where
+    /// The same as [`World::new`], of a scene in canonical order. The world depends on the order of the file only where
     /// surfaces coincide.
     pub fn of(scene: &Canonical, size: [u32; 2]) -> Self {
         let scene_origin = origin::choose_origin(scene.scene());
