@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 /// Surfaces closer than this, relative to their size, coincide. Angles between normals are held to the same number.
-pub const COINCIDENT: f64 = 1e-6;
+pub(crate) const COINCIDENT: f64 = 1e-6;
 
 /// A wider tolerance that finds all surfaces that may coincide: two surfaces may do so by way of a third.
 pub(crate) const MAY_COINCIDE: f64 = 4.0 * COINCIDENT;
@@ -28,7 +28,7 @@ pub(crate) fn parallel(a: DVec3, b: DVec3, within: f64) -> bool {
     a.cross(b).length() <= within
 }
 
-/// Whether a face lies in a plane, given the normals of both, the `height` of the face's center over the plane, and the
+/// Whether a face lies in a plane, given the normals of both, the `height` of the face's centre over the plane, and the
 /// [`face_size`].
 pub(crate) fn in_plane(normals: [DVec3; 2], height: f64, size: f64, within: f64) -> bool {
     parallel(normals[0], normals[1], within) && height.abs() <= within * size
@@ -47,7 +47,7 @@ pub(crate) fn face_size(radius: f64, offsets: [f64; 2]) -> f64 {
 /// A flat face: a disk, a light, the cap of a cylinder, or a whole plane.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Flat {
-    /// The center; any point of a plane.
+    /// The centre; any point of a plane.
     pub center: DVec3,
     /// Unit normal. That of a cap points out of the cylinder.
     pub normal: DVec3,

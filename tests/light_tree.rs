@@ -27,7 +27,7 @@ use etendue::kernel::{Access, scene_probe_source};
 use etendue::reference::Estimator;
 use etendue::scene::Scene;
 use etendue::settings::{LightParts, Settings};
-use etendue::world::{Geometry, MOST_LOOKED_AT, World};
+use etendue::world::{Geometry, MAX_SCANNED_LIGHTS, World};
 use glam::DVec3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::f64::consts::TAU;
@@ -158,7 +158,7 @@ fn the_hall_is_as_bright_as_the_reference_says() {
     let hall = hall();
     let mut settings = direct(&hall, 0);
     let world = World::new(&hall, SIZE);
-    assert!(world.lights.len() > 2 * MOST_LOOKED_AT);
+    assert!(world.lights.len() > 2 * MAX_SCANNED_LIGHTS);
     let mut engine = GpuEngine::on(gpu(), &world, &settings, None).expect("an engine");
     let kernel = engine.kernel();
     assert!(kernel.access == Access::Tree && kernel.wgsl.contains("LIGHT_LEVELS"));

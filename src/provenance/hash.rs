@@ -10,8 +10,8 @@ use crate::settings::{Integrator, LightParts, Settings};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 
-/// Directions are rounded to this fraction of a unit, so that a normal's length in the file, which
-/// normalising leaves a trace of in the last bits, does not count. No pixel is as narrow.
+/// Directions are rounded to this fraction of a unit. The length of a normal in the file leaves a trace in the last bits of the unit
+/// vector, and must not count. No pixel is as narrow as this step.
 const DIRECTION_STEP: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// SHA-256, in hexadecimal, of what the picture of `scene` under `settings` converges to.
@@ -22,7 +22,7 @@ pub fn scene_hash(scene: &Scene, settings: &Settings) -> String {
     hash_of(&Canonical::new(scene), settings)
 }
 
-/// [`scene_hash`] of the scene that was put in order.
+/// The same as [`scene_hash`], of a scene in canonical order.
 pub fn hash_of(scene: &Canonical, settings: &Settings) -> String {
     let mut h = Hasher(Sha256::new_with_prefix("etendue scene 2\0"));
     let scene = scene.scene();
@@ -108,7 +108,7 @@ impl Hasher {
         self.number(vfov);
         let forward = (look_at - eye).normalize();
         self.direction(forward);
-        // Of `up` only the part across the view means anything.
+        // Only the part of `up` across the view means anything.
         self.direction(forward.cross(up.normalize()).normalize());
     }
 
@@ -291,7 +291,9 @@ mod tests {
                 c.up = DVec3::new(0.3, 5.0, -4.0);
                 c.look_at = c.eye + (c.look_at - c.eye) * 3.0;
             }),
-            ("max_depth said aloud", |_, f| f.max_depth = Some(64)),
+            ("the default max_depth, given explicitly", |_, f| {
+                f.max_depth = Some(64);
+            }),
         ];
         let expected = hash(&scene(), &Overrides::default());
         assert_eq!(expected.len(), 64);

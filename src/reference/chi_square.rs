@@ -1,28 +1,28 @@
-//! χ² tests of direction samplers against their densities, for the unit tests beside this file.
+//! χ² tests of direction samplers against their densities. Only unit tests use them.
 //!
-//! Each call rejects a right sampler with probability 3·10⁻⁶ ([`LIMIT`]); seeds are fixed, so a test
-//! that passes once passes always.
+//! Each call rejects a correct sampler with probability 3·10⁻⁶ ([`LIMIT`]). Seeds are fixed, so a test that passes once always
+//! passes.
 
 use super::frame::Frame;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// One-sided normal quantile of the false-alarm rate 3.4·10⁻⁶.
+/// One-sided normal quantile for the false-alarm rate 3.4·10⁻⁶.
 const LIMIT: f64 = 4.5;
 
-/// Cells across one bin, a side, of the midpoint rule.
+/// Cells of the midpoint rule along each side of a bin.
 const CELLS: usize = 24;
 
 /// Rows (in cos θ) and columns (in φ) of bins.
 const ROWS: usize = 32;
 const COLUMNS: usize = 16;
 
-/// Panics if `observed` counts are not what Poisson noise makes of `expected` ones.
+/// Panics if `observed` counts differ from `expected` ones by more than Poisson noise.
 pub fn assert_agrees(what: &str, observed: &[f64], expected: &[f64]) {
     let (mut statistic, mut bins) = (0.0, 0.0);
     let (mut rest_observed, mut rest_expected) = (0.0, 0.0);
     for (o, e) in observed.iter().zip(expected) {
-        // Cochran's rule: χ² wants five expected counts a bin, so the rare ones are put together.
+        // Cochran's rule: χ² wants five expected counts in each bin, so bins with fewer are put together.
         if *e < 5.0 {
             rest_observed += o;
             rest_expected += e;
@@ -50,8 +50,8 @@ pub fn assert_agrees(what: &str, observed: &[f64], expected: &[f64]) {
     );
 }
 
-/// Panics unless directions from `sample` have the density `pdf`, per solid angle. `None` is the outcome
-/// "no sample", due as often as `pdf` falls short of 1. The bins' axis should be where `pdf` has its edges.
+/// Panics unless directions from `sample` have the density `pdf`, per solid angle. The outcome `None`, "no sample", should have the
+/// probability by which the integral of `pdf` falls short of 1. Choose `axis` so that edges of `pdf` lie between bins.
 pub fn assert_density(
     what: &str,
     axis: DVec3,
@@ -85,7 +85,7 @@ pub fn assert_density(
     }
     let total: f64 = expected.iter().sum();
     let none = count as f64 - total;
-    // The midpoint rule is good to a fraction of the noise, 1/√count.
+    // The midpoint rule is accurate to a fraction of the noise, 1/√count.
     assert!(
         none > -0.5 * (count as f64).sqrt(),
         "{what}: pdf integrates to {}",
@@ -100,7 +100,7 @@ fn polar(z: f64, phi: f64) -> DVec3 {
     DVec3::new(s * phi.cos(), s * phi.sin(), z)
 }
 
-/// Mean and standard error of `count` values.
+/// The mean of `count` values, and its standard error.
 pub fn mean_and_error(count: usize, mut value: impl FnMut() -> f64) -> (f64, f64) {
     let (mut sum, mut squares) = (0.0, 0.0);
     for _ in 0..count {

@@ -18,7 +18,7 @@ pub fn pdf(normal: DVec3, wi: DVec3) -> f64 {
     normal.dot(wi).max(0.0) / PI
 }
 
-/// A cosine-distributed direction about `normal`; its weight f cos θ/pdf is the reflectance.
+/// A cosine-distributed direction about `normal`. Its weight f cos θ/pdf is the reflectance.
 pub fn sample(normal: DVec3, u: [f64; 2]) -> DVec3 {
     direction_about(normal, (1.0 - u[0]).sqrt(), u[0].sqrt(), u[1])
 }

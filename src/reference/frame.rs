@@ -1,9 +1,9 @@
-//! Orthonormal frames about a direction.
+//! Orthonormal frames around a direction.
 
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A right-handed orthonormal frame; `z` is the direction it was made around.
+/// A right-handed orthonormal frame; `z` is the direction that it was made around.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
     x: DVec3,
@@ -24,12 +24,12 @@ impl Frame {
         }
     }
 
-    /// World vector of local coordinates.
+    /// The world vector with these local coordinates.
     pub fn to_world(&self, v: DVec3) -> DVec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }
 
-    /// Local coordinates of a world vector.
+    /// The local coordinates of a world vector.
     #[cfg(test)]
     pub fn to_local(&self, v: DVec3) -> DVec3 {
         DVec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))

@@ -1,27 +1,28 @@
 //! Disk lights: choosing one, and sampling directions to it.
 //!
-//! The sphere through the light's rim and the shading point sees the disk as a cap of height H. By the
-//! theorem of the inscribed angle, points spread evenly over that cap are cosine-distributed about the
-//! sphere's normal at the shading point, so that neither distance nor rim makes a spike.
+//! Take the sphere through the light's rim and the shading point. Seen from the point, the disk covers exactly a cap of that
+//! sphere, of height H. By the theorem of the inscribed angle, points spread evenly over the cap give directions that are
+//! cosine-distributed about the sphere's normal at the shading point. So the density has no spike, neither near the light nor near
+//! its rim.
 
 use super::frame::Frame;
 use crate::world::WorldLight;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// A point of view on a light: the light's plane is z = 0, its front z > 0.
+/// A light seen from a point.
 struct View {
-    /// Height above its plane, > 0.
+    /// Height of the point over the light's plane, > 0.
     h: f64,
-    /// The part of (point - centre) that lies in the plane; its length is a, the distance from the axis.
+    /// The part of (point - centre) that lies in the light's plane. Its length is a, the distance from the axis.
     along: DVec3,
-    /// a² + h² - r²: positive outside the sphere over the disk.
+    /// a² + h² - r². It is positive outside the sphere that has the light's rim as a great circle.
     s: f64,
     /// Height of the cap, > 0.
     cap: f64,
 }
 
-/// `None` on and behind the light's plane, where it is not seen.
+/// `None` on and behind the light's plane, where its front is not seen.
 fn view(light: &WorldLight, point: DVec3) -> Option<View> {
     let h = light.normal.dot(point) - light.offset;
     if h <= 0.0 {
@@ -39,8 +40,8 @@ fn view(light: &WorldLight, point: DVec3) -> Option<View> {
     Some(View { h, along, s, cap })
 }
 
-/// How much a light may matter at `point`, any scale: its radiance times about its solid angle were it
-/// turned towards the point; 0 only where its front cannot be seen.
+/// How much a light may matter at `point`, in no particular unit: its radiance times about the solid angle that it would have if it
+/// faced the point. It is 0 only where the front cannot be seen, or for a dark light.
 fn importance(light: &WorldLight, point: DVec3) -> f64 {
     if light.normal.dot(point) - light.offset <= 0.0 {
         return 0.0;
@@ -53,7 +54,7 @@ fn total_importance(lights: &[WorldLight], point: DVec3) -> f64 {
     lights.iter().map(|l| importance(l, point)).sum()
 }
 
-/// The light that `u` in [0, 1) chooses and its probability; `None` where no light can be seen.
+/// The light that `u` in [0, 1) chooses, and the probability of that choice. `None` where no light can be seen.
 pub fn choose(lights: &[WorldLight], point: DVec3, u: f64) -> Option<(usize, f64)> {
     let total = total_importance(lights, point);
     let mut chosen = None;
@@ -81,14 +82,14 @@ pub fn choice_probability(lights: &[WorldLight], index: usize, point: DVec3) -> 
     }
 }
 
-/// A direction from `point` to the light and its density per solid angle; `None` where the light is not seen.
+/// A direction from `point` to the light, and its density per solid angle. `None` where the light is not seen.
 pub fn sample(light: &WorldLight, point: DVec3, u: [f64; 2]) -> Option<(DVec3, f64)> {
     let view = view(light, point)?;
     let r = light.radius;
     let rho = (u[0] * r * r + u[0] * (1.0 - u[0]) * view.cap * view.cap).sqrt();
     let (sin_phi, cos_phi) = (2.0 * PI * u[1]).sin_cos();
-    // The cap is the same all around the light's axis, so any frame does, and none is made from `along`,
-    // which on the axis is rounding noise.
+    // The cap is symmetric about the light's axis, so any frame will do. `along` would not do for one: on the axis it is rounding
+    // noise.
     let on_cap = DVec3::new(rho * cos_phi, rho * sin_phi, -(1.0 - u[0]) * view.cap);
     let to = Frame::around(light.normal).to_world(on_cap) - view.along - light.normal * view.h;
     let length = to.length();
@@ -102,8 +103,7 @@ pub fn pdf(light: &WorldLight, point: DVec3, direction: DVec3) -> f64 {
     let Some(view) = view(light, point) else {
         return 0.0;
     };
-    // The sphere's centre lies at height s/2h, and the chord is twice the part of the way there that lies
-    // along the direction.
+    // The sphere's centre lies at height s/2h. The chord is twice the projection of the way there on the direction.
     let to_centre = light.normal * (view.s / (2.0 * view.h) - view.h) - view.along;
     let pdf = 2.0 * to_centre.dot(direction) / (PI * view.cap);
     if pdf.is_finite() { pdf.max(0.0) } else { 0.0 }
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn closed_forms_have_the_tabulated_values() {
-        // The document's table, itself checked against quadrature.
+        // These values were checked against quadrature.
         for (a, h, expected) in [
             (0.5, 1.0, 0.437983),
             (2.0, 1.0, 0.0527864),
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn sampled_irradiance_is_the_closed_form() {
         let light = unit_light();
-        // Radius 1 throughout; the last is a ten-thousandth of the radius under the light.
+        // The light has radius 1. The last point is a ten-thousandth of the radius under it.
         for (a, h) in [
             (0.5, 1.0),
             (2.0, 1.0),
@@ -177,8 +177,8 @@ mod tests {
                 let mut rng = Sampler::new(1, 0, 0);
                 let (mean, error) = mean_and_error(20_000, || {
                     let (d, pdf) = sample(&light, point, [rng.uniform(), rng.uniform()]).unwrap();
-                    // The part below the receiver's horizon counts negative: the closed form for a receiver
-                    // facing the axis knows no horizon.
+                    // What is below the receiver's horizon counts as negative, because the closed form for a
+                    // receiver that faces the axis knows no horizon.
                     d.dot(receiver) / (PI * pdf)
                 });
                 assert!(

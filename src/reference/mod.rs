@@ -1,8 +1,9 @@
-//! The CPU reference: the same light transport in f64, written to be read, and to be held against.
+//! The CPU reference: the same light transport as the kernel's, in f64. It is written to be read, and the kernel is compared with it.
 //!
-//! One file for each part, named as the shader module that does the same; it shares the [`World`] with the
-//! GPU and nothing else. Two estimators of the same picture: agreement between one that samples lights and one
-//! that only ever finds them by chance leaves little room for an error in either.
+//! Each part has a file of its own, with the name of the shader module that does the same. The reference shares the
+//! [`World`] and its [exact rays](crate::world::trace) with the GPU's host, and nothing with the kernel. It has two estimators
+//! of the same picture. One samples lights, and the other finds them only by chance. If both agree, there is little room for an
+//! error in either.
 
 pub mod diffuse;
 pub mod frame;
@@ -32,9 +33,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// How a path finds lights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
-    /// Shadow rays at every surface that is not a delta function, weighted against chance hits.
+    /// Shadow rays from every surface whose BSDF is not a delta function, weighted against chance hits.
     LightSampling,
-    /// Chance hits alone.
+    /// Only chance hits.
     NoLightSampling,
 }
 
@@ -54,7 +55,7 @@ impl CpuEngine {
         }
     }
 
-    /// What every engine of this kind runs on.
+    /// The device of every engine of this kind.
     pub fn device_info() -> DeviceInfo {
         DeviceInfo {
             name: "CPU reference (f64)".to_owned(),
@@ -64,8 +65,8 @@ impl CpuEngine {
         }
     }
 
-    /// Adds samples to one pixel's sums, one after another, and says how many of each replicate were not finite and are left
-    /// out. `None` when told to stop.
+    /// Adds samples to the sums of one pixel, one after another. Samples that are not finite are left out and counted. `None` when
+    /// told to stop.
     fn render_pixel(
         &self,
         [x, y]: [u32; 2],
@@ -105,7 +106,7 @@ impl CpuEngine {
     }
 }
 
-/// What a pixel has after more samples.
+/// A pixel after more samples.
 struct Pixel {
     sums: [Sums<f64>; REPLICATES],
     left_out: [u64; REPLICATES],

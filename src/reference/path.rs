@@ -1,7 +1,7 @@
 //! The path loop.
 //!
-//! Vertices are numbered from 1, the first thing the eye sees. Light found at vertex k has been scattered k - 1
-//! times; light sampled at vertex k is found at a vertex k + 1.
+//! Vertices are numbered from 1, the first thing that the eye sees. Light found at vertex k has been scattered k - 1 times. Light
+//! sampled from vertex k counts as found at vertex k + 1.
 
 use super::phong::Phong;
 use super::sampler::{Sampler, stratum};
@@ -14,16 +14,16 @@ use crate::world::trace::dielectric::{self, Boundary};
 use crate::world::trace::{Hit, Met, Ray, camera_ray, mirror};
 use glam::DVec3;
 
-/// The first vertex at which a path may be ended by chance: short paths are cheap, and roulette adds noise.
+/// The first vertex at which roulette may end a path. Short paths are cheap, and roulette adds noise.
 const FIRST_ROULETTE: u32 = 5;
 
-/// The most likely that a path survives roulette: light caught between perfect reflectors ends, too.
-const MOST_LIKELY: f64 = 0.999;
+/// The largest probability that a path survives roulette. Light between perfect reflectors ends too.
+const MAX_SURVIVAL: f64 = 0.999;
 
-/// What one path has brought.
+/// The result of one path.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Traced {
-    /// An unbiased estimate of the radiance that arrives against the ray.
+    /// An unbiased estimate of the radiance that arrives at the start of the ray, against its direction.
     pub radiance: DVec3,
     /// Rays traced, shadow rays included.
     pub rays: u64,
@@ -31,22 +31,23 @@ pub struct Traced {
     pub truncated: bool,
 }
 
-/// How a path goes on from a surface.
+/// How a path continues from a surface.
 struct Scattered {
     direction: DVec3,
-    /// f cos θ/pdf, or what stands for it where f is a delta function.
+    /// f cos θ/pdf, or the factor of the delta function.
     weight: DVec3,
     /// Density per solid angle; `None` for a delta function.
     pdf: Option<f64>,
-    /// The solid it goes on in.
+    /// The medium that it continues in.
     medium: u32,
-    /// (n on the eye's side / n beyond)² of the boundary crossed, 1 if none is.
+    /// (n on the eye's side / n beyond)² of the boundary that it crosses; 1 if it crosses none.
     index_ratio: f64,
 }
 
-/// Where the ray under way was chosen with a density that light sampling could have had as well.
+/// Where the present ray started, if light sampling could have chosen its direction as well.
 struct Chosen {
     point: DVec3,
+    /// Density of its direction, per solid angle.
     pdf: f64,
 }
 
@@ -67,7 +68,7 @@ impl Tracer {
     pub fn radiance(&self, mut ray: Ray, rng: &mut Sampler) -> Traced {
         let mut traced = Traced::default();
         let mut throughput = DVec3::ONE;
-        // Radiance over n² is what stays constant; roulette must not see the factor.
+        // Radiance over n² is constant along a path. This factor is kept apart from the throughput, because roulette must not see it.
         let mut index_ratio = 1.0;
         let mut chosen: Option<Chosen> = None;
         for vertex in 1..=self.settings.max_depth {
@@ -96,7 +97,7 @@ impl Tracer {
                 break;
             }
 
-            // Light sampled from here.
+            // Sample lights.
             if self.estimator == Estimator::LightSampling
                 && vertex < self.settings.max_depth
                 && self.keeps(vertex)
@@ -105,7 +106,7 @@ impl Tracer {
                 traced.radiance += throughput * index_ratio * direct;
             }
 
-            // The way on.
+            // Choose the next direction.
             let Some(scattered) = self.scatter(primitive, &hit, &ray, [u[0], u[1], u[2]]) else {
                 break;
             };
@@ -114,7 +115,7 @@ impl Tracer {
             let survival = if vertex < FIRST_ROULETTE {
                 1.0
             } else {
-                throughput.max_element().min(MOST_LIKELY)
+                throughput.max_element().min(MAX_SURVIVAL)
             };
             if throughput == DVec3::ZERO || u[3] >= survival {
                 break;
@@ -137,17 +138,17 @@ impl Tracer {
         traced
     }
 
-    /// Whether the picture keeps light that has been scattered `times` times.
+    /// Whether the picture includes light that has been scattered `times` times.
     fn keeps(&self, times: u32) -> bool {
         self.settings.light.keeps(times)
     }
 
-    /// Whether any light found beyond vertex `vertex` is kept.
+    /// Whether the picture includes any light found beyond vertex `vertex`.
     fn wants_more(&self, vertex: u32) -> bool {
         self.settings.light.indirect || self.keeps(vertex)
     }
 
-    /// Radiance that `settings.shadow_rays` light samples say leaves `hit` against `ray`.
+    /// An estimate, by `settings.shadow_rays` light samples, of the radiance that leaves `hit` against the direction of `ray`.
     fn light_samples(
         &self,
         primitive: &WorldPrimitive,
@@ -193,7 +194,7 @@ impl Tracer {
         sum
     }
 
-    /// Weight of light `index` met by chance, in `direction`, given that light sampling looks for it as well.
+    /// Weight of light `index`, which a ray in `direction` has met by chance, while light sampling looks for it as well.
     fn weight_of_chance(&self, index: usize, chosen: &Option<Chosen>, direction: DVec3) -> f64 {
         match chosen {
             Some(from) if self.estimator == Estimator::LightSampling => {
@@ -207,7 +208,7 @@ impl Tracer {
         }
     }
 
-    /// Samples the material at `hit`; `None` when the path ends there.
+    /// Samples the material at `hit`. `None` if the path ends there.
     fn scatter(
         &self,
         primitive: &WorldPrimitive,
@@ -277,7 +278,7 @@ impl Tracer {
     }
 }
 
-/// f from `wi` into `wo` and the density with which the material samples `wi`; `None` for delta functions.
+/// f from `wi` into `wo`, and the density with which the material samples `wi`. `None` for delta functions.
 fn evaluate(material: &Bsdf, normal: DVec3, wo: DVec3, wi: DVec3) -> Option<(DVec3, f64)> {
     match *material {
         Bsdf::Diffuse { reflectance } => Some((
@@ -300,8 +301,8 @@ fn evaluate(material: &Bsdf, normal: DVec3, wo: DVec3, wi: DVec3) -> Option<(DVe
     }
 }
 
-/// Veach's power heuristic: the weight of a sample whose strategy has density `own`, `other` being that of the
-/// strategy which could have found it too. `own` > 0.
+/// Veach's power heuristic: the weight of a sample that one strategy has found with density `own` > 0, and that the other strategy
+/// would have found with density `other`.
 fn power_heuristic(own: f64, other: f64) -> f64 {
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)

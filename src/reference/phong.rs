@@ -1,5 +1,5 @@
-//! The modified Phong model (Lafortune & Willems 1994): f = kd/π + ks (n+2)/(2π) cosⁿα, α between the mirror
-//! direction of one ray and the other ray. The lobe is zero where cos α <= 0, at n = 0 too.
+//! The modified Phong model (Lafortune & Willems 1994): f = kd/π + ks (n+2)/(2π) cosⁿα, where α is the angle between the mirror
+//! direction of one ray and the other ray. The lobe is zero where cos α <= 0, even for n = 0.
 
 use super::diffuse;
 use super::frame::direction_about;
@@ -19,7 +19,7 @@ pub struct Phong {
 }
 
 impl Phong {
-    /// f, per steradian, from the direction `wi` into `wo`, both away from the surface; 0 below it.
+    /// f, per steradian, from the direction `wi` into `wo`, which both point away from the surface; 0 below the surface.
     pub fn evaluate(&self, normal: DVec3, wo: DVec3, wi: DVec3) -> DVec3 {
         if normal.dot(wi) <= 0.0 {
             return DVec3::ZERO;
@@ -38,13 +38,13 @@ impl Phong {
         )
     }
 
-    /// A direction, its weight f cos θ/pdf, and its density per solid angle. `None`, which counts as zero, for
-    /// a black surface and when the lobe's sample falls below the surface.
+    /// A direction, its weight f cos θ/pdf, and its density per solid angle. `None` for a black surface, and when a sample of the lobe
+    /// falls below the surface: the sample then counts as zero.
     pub fn sample(&self, normal: DVec3, wo: DVec3, u: [f64; 3]) -> Option<(DVec3, DVec3, f64)> {
         let mirror = reflect(-wo, normal);
         let p = self.lobe_probability();
         let (wi, power) = if u[0] < p {
-            // 1 - u is in (0, 1]; cos α = (1-u)^(1/(n+1)), and its nth power needs no other power of it.
+            // 1 - u is in (0, 1], and cos α = (1-u)^(1/(n+1)). Its logarithm gives cos α and cosⁿα by one `exp` each.
             let ln = (1.0 - u[1]).ln() / (self.exponent + 1.0);
             let sine = (-(2.0 * ln).exp_m1()).max(0.0).sqrt();
             let wi = direction_about(mirror, ln.exp(), sine, u[2]);
@@ -58,7 +58,7 @@ impl Phong {
         (cosine > 0.0 && pdf > 0.0).then(|| (wi, self.f(power) * cosine / pdf, pdf))
     }
 
-    /// cosⁿα.
+    /// cosⁿα, or 0 where cos α <= 0.
     fn lobe(&self, cos_alpha: f64) -> f64 {
         if cos_alpha > 0.0 {
             cos_alpha.min(1.0).powf(self.exponent)
@@ -76,7 +76,7 @@ impl Phong {
         (1.0 - p) * cosine_pdf + p * (self.exponent + 1.0) / (2.0 * PI) * power
     }
 
-    /// Probability that [`Phong::sample`] samples the lobe; 0 for a black surface.
+    /// Probability that [`Phong::sample`] chooses the lobe; 0 for a black surface.
     fn lobe_probability(&self) -> f64 {
         let (d, s) = (self.diffuse.element_sum(), self.specular.element_sum());
         if s > 0.0 { s / (d + s) } else { 0.0 }
@@ -143,7 +143,7 @@ mod tests {
                     continue;
                 };
                 let expected = material.pdf(normal, wo, wi);
-                // cos α has 16 digits, and its nth power loses as many as n has.
+                // cos α has 16 digits, and its nth power loses as many digits as n has.
                 let tolerance = 1e-13 * (10.0 + n);
                 assert!(
                     (pdf / expected - 1.0).abs() < tolerance,
@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn albedo_in_a_white_furnace() {
-        // Rows: exponent, then albedo at 0, 30, 60, 85, 90 degrees for ks = 1; from quadrature.
+        // Each row: the exponent, and the albedo at 0, 30, 60, 85 and 90 degrees for ks = 1, from quadrature.
         let table = [
             (1.0, [1.0, 0.88084, 0.60900, 0.36310, FRAC_1_PI]),
             (10.0, [1.0, 0.86603, 0.50474, 0.17127, 0.12305]),

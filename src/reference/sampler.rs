@@ -1,9 +1,9 @@
-//! Random numbers: counter based, so that a sample's numbers depend on its name and on nothing else.
+//! Random numbers. They are counter-based: the numbers of a sample depend only on seed, pixel and sample number.
 
 /// Step between the states of SplitMix64 (Steele, Lea & Flood 2014).
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Keeps the keys of stratum shuffles apart from those of samples.
+/// Keeps the keys of stratum shuffles different from those of samples.
 const SHUFFLE: u64 = 0x5348_5546_464c_4500;
 
 /// The output function of SplitMix64: a bijection of u64 whose values look random.
@@ -34,8 +34,8 @@ impl Sampler {
         }
     }
 
-    /// Goes to the numbers of path vertex `vertex`; 0 is the camera. Thus what one vertex leaves unused,
-    /// such as light samples nobody asked for, does not shift the numbers of the next.
+    /// Goes to the numbers of path vertex `vertex`; 0 is the camera. So numbers that one vertex leaves unused do not shift those of the
+    /// next.
     pub fn start_vertex(&mut self, vertex: u32) {
         self.dimension = u64::from(vertex) << 32;
     }
@@ -48,13 +48,13 @@ impl Sampler {
     }
 }
 
-/// Column and row of the cell, out of `strata` x `strata`, that sample `sample` of a pixel falls in: each
-/// round of strata² samples visits every cell once, in an order of its own.
+/// Column and row of the cell, out of `strata` x `strata`, that sample `sample` of a pixel falls in. Each round of strata² samples
+/// visits every cell once, in an order of its own.
 pub fn stratum(seed: u32, pixel: u64, sample: u64, strata: u32) -> [u32; 2] {
     let cells = u64::from(strata) * u64::from(strata);
     let key = key_of([u64::from(seed), pixel, sample / cells, SHUFFLE]);
-    // Whatever the permutation lacks in randomness, the rotation puts every cell at every place of the
-    // round equally often.
+    // The permutation is not perfectly random. The rotation makes sure that every cell is equally often at every place of the
+    // round.
     let turned = u128::from(permuted(sample % cells, cells, key)) + u128::from(mix(key) % cells);
     let cell = (turned % u128::from(cells)) as u64;
     [
@@ -63,8 +63,8 @@ pub fn stratum(seed: u32, pixel: u64, sample: u64, strata: u32) -> [u32; 2] {
     ]
 }
 
-/// A permutation of 0..cells chosen by `key`: a Feistel network over the next power of four, walked along
-/// until it lands below `cells` (Black & Rogaway 2002).
+/// Element `index` of a permutation of 0..cells that `key` chooses: a Feistel network over the next power of four, applied
+/// again until the result is below `cells` (Black & Rogaway 2002).
 fn permuted(index: u64, cells: u64, key: u64) -> u64 {
     let bits = u64::BITS - (cells - 1).leading_zeros();
     let half = bits.div_ceil(2).max(1);

@@ -27,7 +27,7 @@ impl Tracer {
         &self.world
     }
 
-    /// What decides, besides the scene, what is rendered.
+    /// What decides about the picture besides the scene.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }

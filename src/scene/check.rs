@@ -11,19 +11,19 @@ use super::source::quoted;
 use super::{Bsdf, Diagnostic, Place, Primitive, Scene};
 use glam::DVec3;
 
-/// Scenes with more primitives and lights than this are not searched for things that go wrong
-/// between two of them: that takes time in proportion to the square of their number.
+/// Scenes with more primitives and lights than this are not searched for problems between two things, because the search takes time in
+/// proportion to the square of their number.
 pub const MAX_PAIRWISE: usize = 2000;
 
-/// Warnings of one kind that are written out; the rest are counted.
+/// How many warnings of one kind are written out. The rest are counted.
 pub const MAX_ALIKE: usize = 10;
 
 /// Warnings of one kind.
 #[derive(Default)]
 struct Warnings {
-    /// The first [`MAX_ALIKE`]: place in the scene file, none for the whole file, and message.
+    /// The first [`MAX_ALIKE`] warnings: the place in the scene file, or the default for the whole file, and the message.
     first: Vec<(Place, String)>,
-    /// How many there are besides.
+    /// The number of further warnings.
     more: usize,
 }
 
@@ -39,8 +39,7 @@ impl Warnings {
 
 /// Warnings about what is valid but suspect, in no order of severity. Most scenes have none.
 ///
-/// A closed room of opaque walls, with things that stand on its floor and lamps flush on its
-/// ceiling, has none.
+/// There are none for a closed room of opaque walls, with things that stand on its floor and lamps flush on its ceiling.
 pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
     let mut kinds = vec![materials(scene)];
     let things = scene.primitives.len() + scene.lights.len();
@@ -113,7 +112,7 @@ fn is_dielectric(scene: &Scene, p: &Primitive) -> bool {
     matches!(scene.materials[p.material].bsdf, Bsdf::Dielectric { .. })
 }
 
-/// "the sphere at line 12", or without the line for a scene made in memory.
+/// "the sphere at line 12", or "the sphere" for a scene made in memory.
 fn called(kind: &str, line: usize) -> String {
     if line > 0 {
         format!("the {kind} at line {line}")

@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 pub struct Canonical(Scene);
 
 impl Canonical {
-    /// Of `scene`. For 10⁶ primitives it takes half a second or more: make it once for hash and world.
+    /// Puts `scene` in order. With 10⁶ primitives this takes half a second or more, so do it once for hash and world.
     pub fn new(scene: &Scene) -> Self {
         Self(canonical(scene))
     }
@@ -36,7 +36,7 @@ fn canonical(scene: &Scene) -> Scene {
     let shapes: Vec<Shape> = in_order.iter().map(|&i| s.primitives[i].shape).collect();
     let decides = |a: usize, b: usize| {
         let (p, q) = (&s.primitives[in_order[a]], &s.primitives[in_order[b]]);
-        // Of one opaque material, either shows the same.
+        // Two surfaces of one opaque material look the same, so it does not matter which is met.
         let alike = p.material == q.material && !matches!(bsdf(p), Bsdf::Dielectric { .. });
         !alike && p.shape.may_coincide(&q.shape)
     };
@@ -70,7 +70,7 @@ fn key(numbers: impl IntoIterator<Item = f64>) -> Key {
     let mut key = Key::default();
     for (k, x) in key.iter_mut().zip(numbers) {
         let bits = (x + 0.0).to_bits(); // the two zeros are one
-        // Negative ones the other way round, below the positive: the order of `f64::total_cmp`.
+        // The order of `f64::total_cmp`: the bits of negative numbers are reversed, and come before those of positive ones.
         *k = if bits >> 63 == 1 {
             !bits
         } else {
@@ -80,7 +80,7 @@ fn key(numbers: impl IntoIterator<Item = f64>) -> Key {
     key
 }
 
-/// Indices into `list` by the keys of what they stand for, equal ones in ascending order.
+/// Indices into `list`, sorted by the keys of its elements. Elements with equal keys stay in order.
 fn sorted<T: Sync>(list: &[T], key: impl Fn(&T) -> Key + Sync) -> Vec<usize> {
     let first = |thing: &T| *key(thing).first_chunk::<FIRST>().expect("keys are longer");
     let firsts = list.par_iter().map(first);
@@ -93,7 +93,7 @@ fn sorted<T: Sync>(list: &[T], key: impl Fn(&T) -> Key + Sync) -> Vec<usize> {
     order.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Of lengths and points first: a direction may come out of its normalisation with other last bits.
+/// Lengths and points come first in the key, because the last bits of a direction depend on how it was normalised.
 fn primitive_key(p: &Primitive) -> Key {
     let material = p.material as f64;
     let numbers = |kind: f64, radius: f64, a: DVec3, b: DVec3| {
@@ -135,7 +135,7 @@ fn bsdf_key(bsdf: &Bsdf) -> Key {
     }
 }
 
-/// Sorts the materials, and leaves out those that nothing uses or that another one equals.
+/// Sorts the materials, and removes those that nothing uses or that are equal to another.
 fn merge_materials(s: &mut Scene) {
     let mut used = vec![false; s.materials.len()];
     for p in &s.primitives {
@@ -159,8 +159,8 @@ fn merge_materials(s: &mut Scene) {
     s.materials = merged;
 }
 
-/// `order` with those indices in ascending order among themselves that `decides` joins, directly or through others.
-/// `shapes` are those of the things in `order`, as `decides` gets its arguments from there.
+/// `order` with some of its indices sorted among themselves: those of things that `decides` joins, directly or by way of others.
+/// `shapes` has the shapes of the things in `order`. The arguments of `decides` are places in `order`.
 fn keep_file_order(
     order: &[usize],
     shapes: &[Shape],
@@ -209,13 +209,13 @@ impl Groups {
     }
 }
 
-/// A ball that meets that of every other shape of the kind with which this one may coincide.
-fn place(shape: &Shape) -> (DVec3, f64) {
-    // Ten times the tolerance: what coincides with one thing may coincide with another through it.
+/// A ball around a shape, as centre and radius. The balls of two shapes of one kind touch if the shapes may coincide.
+fn ball_of(shape: &Shape) -> (DVec3, f64) {
+    // Well above `MAY_COINCIDE`, which decides in the end.
     const SLACK: f64 = 10.0 * COINCIDENT;
     let (center, reach) = match *shape {
         Shape::Sphere { center, radius } => (center, SLACK * radius),
-        // The point nearest the file's origin is the same for either direction of the normal.
+        // The point of the plane nearest the file's origin. It does not depend on the sign of the normal.
         Shape::Plane { point, normal } => {
             let foot = normal * normal.dot(point);
             (foot, SLACK * foot.length())
@@ -226,7 +226,7 @@ fn place(shape: &Shape) -> (DVec3, f64) {
             (1.0 + SLACK) * (base.distance(top) / 2.0).hypot(radius),
         ),
     };
-    // Not finer than f64, which the cells are counted in.
+    // Cells are counted in f64, so a ball must not be too small for its distance from the origin.
     (center, reach.max(1e-12 * center.length()).max(1e-30))
 }
 
@@ -239,10 +239,10 @@ fn kind(shape: &Shape) -> u8 {
     }
 }
 
-/// Where a ball is looked for: kind of shape, power of two of the ball's radius, cell of a grid that is coarse for it.
+/// Where a ball is found: its kind of shape, its level, which is log₂ of its radius rounded up, and its cell in the grid of that level.
 type Cell = (u8, i32, [i64; 3]);
 
-/// Edge of a cell over the largest radius of a ball in its grid: most balls meet one cell.
+/// Edge of a cell, divided by the largest radius of a ball in that grid. With this number most balls touch one cell only.
 const CELL: f64 = 8.0;
 
 fn cell(kind: u8, level: i32, p: DVec3) -> Cell {
@@ -250,14 +250,14 @@ fn cell(kind: u8, level: i32, p: DVec3) -> Cell {
     (kind, level, at.to_array().map(|x| x.floor() as i64))
 }
 
-/// Balls by their cells.
+/// Balls by their cells: a hash table whose slots are lists of balls.
 struct Grid {
     balls: Vec<Ball>,
-    /// Kinds and levels that there are.
+    /// The kinds and levels of all balls.
     levels: Vec<(u8, i32)>,
-    /// By a hash of cells, one of the balls there, or [`NONE`].
+    /// The first ball of each slot, or [`NONE`].
     heads: Vec<u32>,
-    /// Of each ball the next with its hash.
+    /// For each ball the next one in its slot, or [`NONE`].
     next: Vec<u32>,
 }
 
@@ -273,7 +273,7 @@ struct Ball {
 impl Grid {
     fn new(shapes: &[Shape]) -> Self {
         let ball = |shape| {
-            let (center, reach) = place(shape);
+            let (center, reach) = ball_of(shape);
             let level = reach.log2().ceil() as i32;
             let cell = cell(kind(shape), level, center);
             Ball {
@@ -302,9 +302,9 @@ impl Grid {
         }
     }
 
-    /// Index of a cell of `balls` balls in [`heads`](Self::heads).
+    /// The slot of a cell, in a grid of `balls` balls.
     fn slot(&(kind, level, at): &Cell, balls: usize) -> usize {
-        // Odd numbers with no pattern to their bits: those of the golden ratio.
+        // An odd number without a pattern in its bits, from the golden ratio.
         const MIX: u64 = 0x9e37_79b9_7f4a_7c15;
         let words = [u64::from(kind), level as u64]
             .into_iter()
@@ -313,8 +313,8 @@ impl Grid {
         (hash >> 32) as usize & ((2 * balls).next_power_of_two() - 1)
     }
 
-    /// Calls `found` with balls of its kind that ball `k` meets, and some more, until it breaks; each pair from one side
-    /// alone: of larger ones all, of its level those before it.
+    /// Calls `found` with the balls of the same kind that ball `k` touches, and some more, until it breaks. Each pair is found once: from
+    /// the ball of the lower level, or from the later of two on one level.
     fn near(&self, k: usize, mut found: impl FnMut(usize) -> ControlFlow<()>) -> ControlFlow<()> {
         let ball = &self.balls[k];
         let (own_kind, own_level, _) = ball.cell;
@@ -345,7 +345,7 @@ impl Grid {
     }
 }
 
-/// Calls `visit` with all pairs of shapes of one kind whose balls meet, and some more.
+/// Calls `visit` with all pairs of shapes of one kind whose balls touch, and some more.
 fn for_each_near_pair(shapes: &[Shape], mut visit: impl FnMut(usize, usize)) {
     let grid = Grid::new(shapes);
     // Most objects have no near neighbour, which can be checked in parallel.
@@ -366,7 +366,7 @@ mod tests {
 
     #[test]
     fn near_pairs_are_all_that_a_search_of_every_pair_finds() {
-        // A spread of sizes and places with no pattern to it: the golden ratio's multiples.
+        // Multiples of the golden ratio: a spread of sizes and places without a pattern.
         let spread = |k: usize, salt: f64| (k as f64 * 0.618_033_988_749 * salt).fract();
         let shapes: Vec<Shape> = (0..400)
             .map(|k| Shape::Disk {
@@ -376,7 +376,7 @@ mod tests {
             })
             .collect();
         let meet = |a: usize, b: usize| {
-            let ((c, r), (d, s)) = (place(&shapes[a]), place(&shapes[b]));
+            let ((c, r), (d, s)) = (ball_of(&shapes[a]), ball_of(&shapes[b]));
             c.distance(d) <= r + s
         };
         let mut found = Vec::new();
@@ -401,7 +401,7 @@ mod tests {
             center: DVec3::X * x,
             radius: 1.0,
         };
-        // Things 0 to 4 of a file, of which 0, 2 and 4 are in one place, sorted as 4, 3, 2, 1, 0.
+        // Things 0 to 4 of a file, sorted as 4, 3, 2, 1, 0. Things 0, 2 and 4 are in one place.
         let shapes = [ball(0.0), ball(5.0), ball(0.0), ball(9.0), ball(0.0)];
         let order = [4, 3, 2, 1, 0];
         let joined = |a: usize, b: usize| shapes[a] == shapes[b];

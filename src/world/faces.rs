@@ -1,34 +1,39 @@
-//! Identities of faces: planar faces that coincide share one, and one equation.
+//! Identities of faces. Flat faces that coincide share an identity, and the equation of their plane.
 
 use super::{Geometry, WorldLight, WorldPrimitive, face, key};
 use crate::coincidence::{self, COINCIDENT};
 use glam::DVec3;
 use std::collections::{BTreeMap, HashMap};
 
-/// A planar face on its way to an identity.
+/// A flat face that gets an identity.
 #[derive(Clone, Copy)]
 struct Face {
     owner: Owner,
     normal: DVec3,
     offset: f64,
     center: DVec3,
-    /// Radius; infinite for planes.
-    size: f64,
+    /// Infinite for planes.
+    radius: f64,
 }
 
+/// What a flat face belongs to.
 #[derive(Clone, Copy)]
 enum Owner {
+    /// A light, by its index.
     Light(usize),
+    /// A disk or a plane, by its index among the primitives.
     Flat(usize),
+    /// A cylinder, by its index among the primitives, and which end: 0 is the base, 1 the top.
     Cap(usize, usize),
 }
 
-/// Gives planar faces that coincide (within [`COINCIDENT`]) the equation of the largest, and each plane a number
-/// of its own, for [`name`].
+/// Gives flat faces that coincide (within [`COINCIDENT`]) the equation of the largest of them. Each plane gets a number, from 1,
+/// which stands in the identities of its faces until [`name`] replaces it.
 pub(super) fn identify(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
-    let mut faces = planar_faces(lights, primitives);
-    // The largest first: smaller faces take its equation. Stable, so the order given decides among equals.
-    faces.sort_by(|a, b| b.size.total_cmp(&a.size));
+    let mut faces = flat_faces(lights, primitives);
+    // The largest face comes first, and smaller ones take its equation. The sort is stable: among faces of one size the first
+    // stays first.
+    faces.sort_by(|a, b| b.radius.total_cmp(&a.radius));
     let mut planes = Planes::default();
     for face in faces {
         let (plane, shared) = planes.join(&face);
@@ -36,15 +41,15 @@ pub(super) fn identify(lights: &mut [WorldLight], primitives: &mut [WorldPrimiti
     }
 }
 
-fn planar_faces(lights: &[WorldLight], primitives: &[WorldPrimitive]) -> Vec<Face> {
+fn flat_faces(lights: &[WorldLight], primitives: &[WorldPrimitive]) -> Vec<Face> {
     let mut faces = Vec::new();
-    let mut add = |owner, normal, offset, center, size| {
+    let mut add = |owner, normal, offset, center, radius| {
         faces.push(Face {
             owner,
             normal,
             offset,
             center,
-            size,
+            radius,
         });
     };
     for (i, l) in lights.iter().enumerate() {
@@ -92,15 +97,15 @@ struct Shared {
     offset: f64,
 }
 
-/// Planes found so far, where those that coincide with a face are found without looking at all: by the
-/// direction of their normals on a grid, then by their offsets.
+/// The planes found so far, in an index that finds those near a face. They are sorted by the cell of a grid that their normal lies
+/// in, and by their offset.
 #[derive(Default)]
 struct Planes {
     cells: HashMap<[i32; 3], BTreeMap<OrderedFloat, Vec<Shared>>>,
     count: u32,
 }
 
-/// A finite number with an order.
+/// A number that can be the key of a map.
 #[derive(Clone, Copy, PartialEq)]
 struct OrderedFloat(f64);
 
@@ -118,14 +123,14 @@ impl Ord for OrderedFloat {
     }
 }
 
-/// Edge of a cell of directions; coincident normals differ by far less.
+/// Edge of a cell of the grid of normals. Normals of planes that coincide differ by far less.
 const CELL: f64 = 1e-3;
 
 fn cell_of(n: DVec3) -> [i32; 3] {
     (n / CELL).to_array().map(|x| x.floor() as i32)
 }
 
-/// Cells within reach of a direction: one, or up to eight near edges.
+/// The cells that may hold normals like `n`: one cell, or up to eight if `n` is near the border of its cell.
 fn cells_around(n: DVec3) -> impl Iterator<Item = [i32; 3]> {
     let (low, high) = (cell_of(n - 2.0 * COINCIDENT), cell_of(n + 2.0 * COINCIDENT));
     (low[0]..=high[0]).flat_map(move |x| {
@@ -134,7 +139,7 @@ fn cells_around(n: DVec3) -> impl Iterator<Item = [i32; 3]> {
 }
 
 impl Planes {
-    /// The plane that the face shares, turned to the face's side, and whether it was there before.
+    /// The plane of the face, with its normal turned like that of the face, and whether an earlier face is in it too.
     fn join(&mut self, face: &Face) -> (Shared, bool) {
         if let Some(found) = self.find(face) {
             let sign = found.normal.dot(face.normal).signum();
@@ -162,8 +167,8 @@ impl Planes {
 
     /// The first plane that coincides with the face.
     fn find(&self, face: &Face) -> Option<Shared> {
-        let reach = if face.size.is_finite() {
-            face.size + face.center.length()
+        let reach = if face.radius.is_finite() {
+            face.radius + face.center.length()
         } else {
             face.offset.abs()
         };
@@ -186,12 +191,12 @@ impl Planes {
 
 fn coincide(plane: &Shared, face: &Face) -> bool {
     let height = plane.normal.dot(face.center) - plane.offset;
-    let size = coincidence::face_size(face.size, [plane.offset, face.offset]);
+    let size = coincidence::face_size(face.radius, [plane.offset, face.offset]);
     coincidence::in_plane([plane.normal, face.normal], height, size, COINCIDENT)
 }
 
-/// Gives the owner of a face the plane's identity and equation; a cylinder keeps its own axis while it
-/// shares no plane.
+/// Gives the owner of a face the number and the equation of the plane. A cylinder keeps its own axis unless another face shares the
+/// plane.
 fn move_onto(
     plane: Shared,
     shared: bool,
@@ -244,8 +249,8 @@ fn move_onto(
     }
 }
 
-/// Gives every face its identity: the number of a plane becomes the face of the key that is met first in it. Curved
-/// faces, still 0, have their own.
+/// Gives every face its identity. The number of a plane becomes the identity of the face that is met first in the plane. Curved
+/// faces have no number of a plane, but 0, and get an identity of their own.
 pub(super) fn name(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
     let mut names = HashMap::new();
     let first = lights.len();

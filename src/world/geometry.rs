@@ -5,8 +5,8 @@ use crate::scene::Shape;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// World-space shapes; `offset`s are n·p of the planes that faces lie in, bit-identical (up to
-/// sign) for faces that coincide.
+/// A shape in world space. An `offset` is n·p of the plane that a face lies in. Faces that coincide have the same offset to the last
+/// bit, or the opposite one.
 #[expect(missing_docs, reason = "each variant's text names its fields")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Geometry {
@@ -17,15 +17,15 @@ pub enum Geometry {
         offset: f64,
         radius: f64,
     },
-    /// Solid with two caps: `axis` has unit length; cap planes are axis·p = offsets\[0\] (at `base`) and
-    /// offsets\[1\] = offsets\[0\] + length.
+    /// Solid with two caps. `axis` has unit length. The caps lie in the planes axis·p = offsets\[0\], which holds `base`, and
+    /// axis·p = offsets\[1\], which is offsets\[0\] + length.
     Cylinder {
         base: DVec3,
         axis: DVec3,
         offsets: [f64; 2],
         radius: f64,
     },
-    /// Infinite plane n·p = offset. An opaque one has its normal turned to the eye.
+    /// Infinite plane n·p = offset. The normal of an opaque plane points to the eye's side.
     Plane { normal: DVec3, offset: f64 },
     /// Sphere of ordinary size.
     Sphere { center: DVec3, radius: f64 },
@@ -38,7 +38,7 @@ pub enum Geometry {
     },
 }
 
-/// Where a flat disk lies, seen from a solid.
+/// Where a flat disk lies, relative to a solid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DiskSide {
     /// Wholly inside.
@@ -88,7 +88,7 @@ impl Geometry {
         }
     }
 
-    /// Parts with a face of their own: the side and two caps of a cylinder, one of anything else.
+    /// How many faces it has: a cylinder has its side and two caps, anything else has one.
     pub fn parts(&self) -> usize {
         if matches!(self, Self::Cylinder { .. }) {
             3
@@ -97,7 +97,7 @@ impl Geometry {
         }
     }
 
-    /// Whether `p` is strictly inside the solid (behind it, for a plane).
+    /// Whether `p` is strictly inside the solid, or behind the plane. A disk holds nothing.
     pub fn holds(&self, p: DVec3) -> bool {
         match *self {
             Self::Sphere { center, radius } => p.distance_squared(center) < radius * radius,
@@ -124,20 +124,20 @@ impl Geometry {
         }
     }
 
-    /// Where the disk about `center` lies. Surfaces that coincide do not cut: a disk flush on a cap or plane
-    /// is on the side to which `normal` points.
+    /// Where the disk around `center` lies. Surfaces that coincide do not cut each other: a disk flush on a cap or a plane is on
+    /// the side that `normal` points to.
     pub(super) fn side_of_disk(&self, center: DVec3, normal: DVec3, size: f64) -> DiskSide {
         let sorted = |inside: bool, outside: bool| match (inside, outside) {
             (true, false) => DiskSide::Inside,
             (_, true) => DiskSide::Outside,
             (false, false) => DiskSide::Cut,
         };
-        // Whether the disk's extent along `n` about its centre lies below the plane n.p = offset, or above.
+        // Whether the whole disk lies below the plane n·p = offset, and whether it lies above.
         let against = |n: DVec3, offset: f64| {
             let (height, reach) = (n.dot(center) - offset, size * n.cross(normal).length());
             let slack = slack(size);
             let (below, above) = (height + reach <= slack, height - reach >= -slack);
-            // Flush, it lies on the side to which it faces.
+            // A flush disk is both, and counts on the side that it faces.
             let outwards = n.dot(normal) > 0.0;
             let (flush_outside, flush_inside) =
                 (below && above && outwards, below && above && !outwards);

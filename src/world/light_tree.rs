@@ -1,15 +1,16 @@
-//! The tree of light clusters by which one of many lights is chosen (`shaders/light/choose_by_tree.wgsl`): balanced, so that all choices take as many steps.
+//! The tree of light clusters by which the kernel chooses one of many lights (`shaders/light/choose_by_tree.wgsl`). It is balanced, so
+//! all choices take the same number of steps.
 
 use super::{World, WorldLight};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Lights of one cluster at the end of the tree, among which the closed form chooses: the shader knows it.
+/// The number of lights of a leaf, a cluster at the end of the tree. A closed form chooses among them. The shader knows this number.
 pub(crate) const LIGHTS_A_CLUSTER: usize = 4;
 
-/// Scenes with more lights choose among them by a tree: a look at every light for every choice is the better choice, but
-/// costs more and more.
-pub const MOST_LOOKED_AT: usize = 48;
+/// Scenes with more lights than this choose among them by a tree. Every choice in other scenes looks at every light, which chooses
+/// better but costs more with every light.
+pub const MAX_SCANNED_LIGHTS: usize = 48;
 
 /// A cluster, as the kernel reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -18,39 +19,39 @@ pub(crate) struct Cluster {
     pub center: DVec3,
     /// Radius of the ball.
     pub radius: f64,
-    /// Unit axis of a cone that holds their normals, times their power over that of the brightest light.
+    /// Unit axis of a cone that holds the normals of its lights, times their power relative to the brightest light.
     pub power: DVec3,
     /// Cosine of the cone's half angle.
     pub cos_cone: f64,
 }
 
-/// Clusters, and the lights in their order.
+/// The tree: clusters, and the lights of the leaves.
 pub(crate) struct LightTree {
-    /// Cluster k has the halves 2k and 2k + 1; number 0 is none.
+    /// Cluster k has the halves 2k and 2k + 1. Cluster 1 holds all lights; number 0 is not used.
     pub clusters: Vec<Cluster>,
-    /// Indices of lights, `u32::MAX` for none: of each cluster at the end of the tree.
+    /// The indices of the lights of each leaf; `u32::MAX` where a leaf has fewer lights.
     pub order: Vec<[u32; LIGHTS_A_CLUSTER]>,
-    /// Of each light its place among them.
+    /// The place of each light in `order`.
     pub places: Vec<u32>,
 }
 
-/// Clusters at the end of the tree of so many lights: a power of two.
+/// The number of leaves of a tree of this many lights, a power of two.
 pub(crate) fn ends(lights: usize) -> usize {
     lights.div_ceil(LIGHTS_A_CLUSTER).next_power_of_two()
 }
 
-/// Steps from the whole of so many lights to a cluster at the end.
+/// The number of steps from the root to a leaf, in a tree of this many lights.
 pub(crate) fn levels(lights: usize) -> u32 {
     ends(lights).ilog2()
 }
 
-/// Whether so many lights are chosen among by a tree.
+/// Whether scenes with this many lights choose among them by a tree.
 pub(crate) fn serves(lights: usize) -> bool {
-    lights > MOST_LOOKED_AT
+    lights > MAX_SCANNED_LIGHTS
 }
 
 impl LightTree {
-    /// Of all lights of a world.
+    /// The tree of all lights of a world.
     pub fn new(world: &World) -> Self {
         let lights = &world.lights;
         let ends = ends(lights.len());
@@ -65,7 +66,7 @@ impl LightTree {
         tree
     }
 
-    /// Makes cluster `k` of these lights, and all below it.
+    /// Makes cluster `k` of these lights, and all clusters below it.
     fn split(&mut self, lights: &[WorldLight], brightest: f64, k: usize, these: &mut [usize]) {
         self.clusters[k] = cluster(lights, brightest, these);
         let ends = self.clusters.len() / 2;
@@ -79,7 +80,7 @@ impl LightTree {
         let middle = these.len().div_ceil(2);
         if middle < these.len() {
             let along = widest(lights, these);
-            // Equal ones by number: the same tree every time.
+            // Equal lights are sorted by their number, so that the tree is the same every time.
             these.select_nth_unstable_by(middle, |&a, &b| {
                 along(&lights[a])
                     .total_cmp(&along(&lights[b]))
@@ -92,18 +93,20 @@ impl LightTree {
     }
 }
 
-/// By how much the channels of a light count when one is chosen: half by luminance, half alike. By luminance alone a blue
-/// light is so rarely chosen that blue is almost all of the error of a picture, and alike for all the luminance suffers.
+/// The weights of a light's channels when one of the lights is chosen: the mean of luminance weights and equal weights. With luminance
+/// alone a blue light is so rarely chosen that most of a picture's error is in the blue channel. With equal weights the luminance is
+/// noisier.
 pub(crate) const LIGHT_COLORS: DVec3 = DVec3::new(0.273, 0.5243, 0.2027);
 
-/// What a light sends out, up to a factor.
+/// The power of a light, up to a factor.
 fn power(l: &WorldLight) -> f64 {
     PI * l.radius * l.radius * l.radiance.dot(LIGHT_COLORS)
 }
 
-/// The coordinate, of place or (weighed against the extent) of the normal, in which lights differ most.
+/// The coordinate in which these lights differ most. It is one of the place or one of the normal, whose differences count relative to
+/// the extent of the places.
 fn widest(lights: &[WorldLight], these: &[usize]) -> impl Fn(&WorldLight) -> f64 + use<> {
-    // Two lights that face opposite ways are as different as two at this share of the extent.
+    // A difference of 1 between normals counts as much as this fraction of the extent.
     const TURN: f64 = 0.25;
 
     let extent = |of: &dyn Fn(&WorldLight) -> DVec3| {
@@ -127,9 +130,10 @@ fn widest(lights: &[WorldLight], these: &[usize]) -> impl Fn(&WorldLight) -> f64
     }
 }
 
+/// The cluster of these lights.
 fn cluster(lights: &[WorldLight], brightest: f64, these: &[usize]) -> Cluster {
-    // Of the brightest; the kernel squares it in f32.
-    const LEAST: f64 = 1e-15;
+    // Smallest power of a cluster, relative to the brightest light. The kernel squares it in f32.
+    const MIN_POWER: f64 = 1e-15;
 
     let shining: Vec<&WorldLight> = these
         .iter()
@@ -153,9 +157,9 @@ fn cluster(lights: &[WorldLight], brightest: f64, these: &[usize]) -> Cluster {
     let total: f64 = shining.iter().map(|l| power(l) / brightest).sum();
     Cluster {
         center,
-        // Rounded to f32 it still holds them.
+        // A little larger, so that it still holds the lights after rounding to f32.
         radius: (radius + 1e-6 * center.length()) * (1.0 + 1e-5),
-        power: axis * total.max(LEAST),
+        power: axis * total.max(MIN_POWER),
         cos_cone: (cos_cone - 1e-5).max(-1.0),
     }
 }

@@ -1,5 +1,4 @@
-//! Sides and media: which side of what rays can be on, which dielectric solid lies in which, and which one
-//! a light shines in.
+//! Sides and media: on which side of a surface rays can be, how dielectric solids nest, and which medium a light shines in.
 
 use super::geometry::DiskSide;
 use super::{AIR, Bounds, Geometry, Side, Tree, WorldLight, WorldPrimitive};
@@ -7,14 +6,15 @@ use crate::coincidence::{COINCIDENT, MAY_COINCIDE, parallel};
 use crate::scene::Bsdf;
 use glam::DVec3;
 
-/// Times the format's largest radiance this still fits f32. An index of thirty million between eye and light would exceed it.
+/// Largest factor on a light's radiance. The format's largest radiance times this factor still fits f32. Only an index of refraction
+/// beyond thirty million between eye and light would exceed it.
 const LARGEST_SCALE: f64 = 1e15;
 
 fn is_dielectric(bsdf: &Bsdf) -> bool {
     matches!(bsdf, Bsdf::Dielectric { .. })
 }
 
-/// Opaque planes turn to the eye, opaque solids learn whether the eye is inside.
+/// Turns opaque planes to the eye, and notes for opaque solids whether the eye is inside.
 pub(super) fn settle_sides(primitives: &mut [WorldPrimitive], materials: &[Bsdf], eye: DVec3) {
     for p in primitives {
         if is_dielectric(&materials[p.material]) || matches!(p.geometry, Geometry::Disk { .. }) {
@@ -35,7 +35,7 @@ pub(super) fn settle_sides(primitives: &mut [WorldPrimitive], materials: &[Bsdf]
     }
 }
 
-/// Whether solid `outer` holds solid `inner`; of two equal ones the `first` in the file is the outer.
+/// Whether solid `outer` holds solid `inner`. Of two equal solids, the one that is `first` in the file is the outer.
 fn encloses(outer: &Geometry, inner: &Geometry, first: bool) -> bool {
     if let (
         Geometry::Plane { normal, offset },
@@ -45,7 +45,7 @@ fn encloses(outer: &Geometry, inner: &Geometry, first: bool) -> bool {
         },
     ) = (outer, inner)
     {
-        // Half-spaces that are not parallel cross, and neither holds the other.
+        // Half-spaces that are not parallel cross. Neither holds the other.
         let same_way = parallel(*normal, *n, COINCIDENT) && normal.dot(*n) > 0.0;
         return same_way && (offset > o || (offset == o && first));
     }
@@ -61,14 +61,14 @@ pub(super) struct Media {
     index: Index,
 }
 
-/// Where solids are: which of them may hold or cut something.
+/// An index of the places of solids. It finds the solids that may hold or cut something.
 #[derive(Debug, Clone, PartialEq)]
 struct Index {
-    /// Over the boxes of those that have one.
+    /// Over the boxes of the solids that have one.
     tree: Tree,
-    /// Their numbers, in the order of the boxes.
+    /// The numbers of these solids, in the order of the boxes.
     bounded: Vec<usize>,
-    /// The others.
+    /// The numbers of solids without a box.
     unbounded: Vec<usize>,
 }
 
@@ -77,7 +77,7 @@ impl Index {
         let (mut boxes, mut bounded, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
         for (k, geometry) in solids.enumerate() {
             match geometry.bounds() {
-                // What lies flush on a solid, within the tolerance, is about it too.
+                // The box is a little larger, to find what lies flush on the solid as well.
                 Some(b) => {
                     let slack = (b.max - b.min) * MAY_COINCIDE;
                     boxes.push(Bounds {
@@ -96,24 +96,25 @@ impl Index {
         }
     }
 
-    /// Calls `found` with every solid that may touch the box, in no order.
-    fn about(&self, bounds: &Bounds, mut found: impl FnMut(usize)) {
+    /// Calls `found` with the number of every solid that may touch the box, in no particular order.
+    fn near(&self, bounds: &Bounds, mut found: impl FnMut(usize)) {
         self.unbounded.iter().copied().for_each(&mut found);
         self.tree.touching(bounds, |i| found(self.bounded[i]));
     }
 }
 
+/// A dielectric solid.
 #[derive(Debug, Clone, PartialEq)]
 struct Solid {
     geometry: Geometry,
-    /// How many solids deep it lies; those in air have 1.
+    /// How many solids it lies in, counting itself: 1 for a solid in air.
     depth: usize,
     /// Index of refraction inside, relative to air.
     index: f64,
 }
 
 impl Media {
-    /// Numbers the dielectric solids, and finds the one just outside each.
+    /// Numbers the dielectric solids, and finds the parent of each.
     pub(super) fn new(primitives: &mut [WorldPrimitive], materials: &[Bsdf]) -> Self {
         let solids: Vec<usize> = (0..primitives.len())
             .filter(|&i| is_dielectric(&materials[primitives[i].material]))
@@ -123,18 +124,18 @@ impl Media {
             .map(|k| {
                 let inner = &primitives[solids[k]].geometry;
                 let mut found = Vec::new();
-                index.about(&Bounds::about(inner.core().0, DVec3::ZERO), |m| {
+                index.near(&Bounds::about(inner.core().0, DVec3::ZERO), |m| {
                     if m != k && encloses(&primitives[solids[m]].geometry, inner, m < k) {
                         found.push(m);
                     }
                 });
-                // In file order, which decides among equals.
+                // In file order, which decides between equal solids.
                 found.sort_unstable();
                 found
             })
             .collect();
         for (k, &i) in solids.iter().enumerate() {
-            // Those around it lie in each other like the skins of an onion: the innermost has the most around it.
+            // The solids around one lie in each other like the skins of an onion. The innermost of them has the most around it.
             let innermost = around[k].iter().max_by_key(|&&m| around[m].len());
             primitives[i].solid = k as u32 + 1;
             primitives[i].parent = innermost.map_or(AIR, |&m| m as u32 + 1);
@@ -163,10 +164,10 @@ impl Media {
         }
     }
 
-    /// The innermost solid that `holds` among those that may touch a box.
-    fn innermost(&self, about: &Bounds, holds: impl Fn(&Geometry) -> bool) -> u32 {
+    /// The innermost of the solids for which `holds` is true, among those that may touch a box; [`AIR`] if there is none.
+    fn innermost(&self, bounds: &Bounds, holds: impl Fn(&Geometry) -> bool) -> u32 {
         let mut found = Vec::new();
-        self.index.about(about, |k| {
+        self.index.near(bounds, |k| {
             if holds(&self.solids[k].geometry) {
                 found.push(k);
             }
@@ -182,13 +183,13 @@ impl Media {
         self.innermost(&Bounds::about(p, DVec3::ZERO), |g| g.holds(p))
     }
 
-    /// Index of refraction of every medium, relative to air: air's, then those of the solids.
+    /// Index of refraction of every medium, relative to air: first of air, then of the solids.
     pub(super) fn indices(&self) -> Vec<f64> {
         let solids = self.solids.iter().map(|s| s.index);
         std::iter::once(1.0).chain(solids).collect()
     }
 
-    /// (n at the eye / n in the medium)² for every medium, air first; at most [`LARGEST_SCALE`].
+    /// (n at the eye / n in the medium)² for every medium, air first, and at most [`LARGEST_SCALE`]. The eye is in medium `eye`.
     pub(super) fn light_scales(&self, eye: u32) -> Vec<f64> {
         let indices = self.indices();
         let n = indices[eye as usize];
@@ -196,21 +197,21 @@ impl Media {
         indices.iter().map(scale).collect()
     }
 
-    /// The medium that a light shines in; `None` if a surface cuts it, or seems to.
+    /// The medium that a light shines in; `None` if the surface of a solid may cut the light.
     pub(super) fn of_light(&self, l: &WorldLight) -> Option<u32> {
         let side = |g: &Geometry| g.side_of_disk(l.center, l.normal, l.radius);
         let mut cut = false;
-        self.index.about(&around(l), |k| {
+        self.index.near(&bounds_of(l), |k| {
             cut |= side(&self.solids[k].geometry) == DiskSide::Cut;
         });
-        (!cut).then(|| self.innermost(&around(l), |g| side(g) == DiskSide::Inside))
+        (!cut).then(|| self.innermost(&bounds_of(l), |g| side(g) == DiskSide::Inside))
     }
 
-    /// For every medium, air first, whether it is a solid in which any part of a light may lie.
+    /// Whether any part of a light may lie in a medium, for every medium. The first is air, for which the answer is false.
     pub(super) fn holding(&self, lights: &[WorldLight]) -> Vec<bool> {
         let mut holding = vec![false; self.solids.len() + 1];
         for l in lights {
-            self.index.about(&around(l), |k| {
+            self.index.near(&bounds_of(l), |k| {
                 let g = &self.solids[k].geometry;
                 holding[k + 1] |= g.side_of_disk(l.center, l.normal, l.radius) != DiskSide::Outside;
             });
@@ -219,6 +220,6 @@ impl Media {
     }
 }
 
-fn around(l: &WorldLight) -> Bounds {
+fn bounds_of(l: &WorldLight) -> Bounds {
     Bounds::disk(l.center, l.normal, l.radius)
 }

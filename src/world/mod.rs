@@ -1,19 +1,18 @@
-//! The scene made ready for rays, in f64: moved to where f32 is fine enough, coincident planar
-//! surfaces given one equation, and everything about *sides* settled once, so that no ray ever has
-//! to infer from a rounded number which side of a surface it is on.
+//! The scene made ready for rays, in f64.
+//!
+//! The world moves the scene to where f32 is fine enough, and gives flat surfaces that coincide one equation. It decides all that
+//! concerns *sides*, so that no ray has to infer from a rounded number which side of a surface it is on.
 //!
 //! Three facts make that possible:
 //!
-//! - Nothing passes an opaque surface. A path is for ever on the eye's side of an opaque plane and
-//!   outside (or inside) an opaque solid as the eye is: [`Side`] says which root of the intersection
-//!   can be met, and rounding can move a hit but never lose it.
-//! - Dielectric solids nest. The only dielectric surfaces a ray in solid M can meet are M's own, from
-//!   inside, and those of the solids whose parent is M, from outside. A path carries the number of
-//!   its solid ([`AIR`] for none).
-//! - Radiance over n² is constant along a path, so the factors of all refractions between a light
-//!   and the eye telescope to (n at the eye / n at the light)², which is part of
-//!   [`WorldLight::radiance`] here; nothing is left for the path to carry. Only for a light that pokes
-//!   through the surface of a solid does it matter where on it a path ends: [`World::light_scales`].
+//! - Nothing passes an opaque surface. A path always stays on the eye's side of an opaque plane. It stays outside an opaque solid
+//!   if the eye is outside, and inside if the eye is inside. So [`Side`] says which root of the intersection a ray can meet, and
+//!   rounding can move a hit but never lose it.
+//! - Dielectric solids nest. A ray in solid M can meet only two kinds of dielectric surface: that of M, from inside, and those of
+//!   the solids whose parent is M, from outside. A path carries the number of its solid ([`AIR`] for none).
+//! - Radiance over n² is constant along a path. The factors of all refractions between a light and the eye therefore multiply to
+//!   (n at the eye / n at the light)². [`WorldLight::radiance`] contains that factor, and the path carries nothing. The
+//!   exception is a light that pokes through the surface of a solid: [`World::light_scales`].
 
 mod faces;
 mod geometry;
@@ -26,10 +25,8 @@ mod tree;
 pub(crate) mod visibility;
 
 pub use geometry::Geometry;
-pub use light_tree::MOST_LOOKED_AT;
+pub use light_tree::MAX_SCANNED_LIGHTS;
 pub use tree::{Bounds, Node, Tree};
-
-pub use crate::coincidence::COINCIDENT;
 
 use crate::coincidence::slack;
 use crate::scene::{Bsdf, Canonical, Scene};
@@ -39,14 +36,14 @@ use media::Media;
 /// The medium outside every dielectric solid.
 pub const AIR: u32 = 0;
 
-/// Where rays can be, seen from a primitive.
+/// On which side of a primitive rays can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Side {
-    /// Always outside this opaque solid (in front of this opaque plane).
+    /// Always outside this opaque solid, or in front of this opaque plane.
     Outside,
     /// Always inside this opaque solid, where the eye is.
     Inside,
-    /// On either side: a dielectric, or a disk.
+    /// On both sides, of a dielectric or a disk.
     Both,
 }
 
@@ -57,14 +54,14 @@ pub struct WorldPrimitive {
     pub geometry: Geometry,
     /// Index into [`World::materials`].
     pub material: usize,
-    /// Where rays can be.
+    /// On which side rays can be.
     pub side: Side,
-    /// Number of the dielectric solid it bounds, from 1; [`AIR`] for opaque things.
+    /// Number of the dielectric solid that it bounds, from 1; [`AIR`] for opaque things.
     pub solid: u32,
     /// The solid just outside `solid`.
     pub parent: u32,
-    /// Identity of its faces (cylinder: side, base cap, top cap; others use the first): [`face`] of
-    /// its key, or of the key of the first of the planar faces that coincide; never 0.
+    /// Identities of its faces: side, base cap and top cap of a cylinder; other shapes use the first. The identity is the
+    /// [`face`] of its own key, or of the key of the first flat face that coincides with it. Never 0.
     pub faces: [u32; 3],
     /// Whether any part of a light may lie inside this dielectric solid.
     pub holds_light: bool,
@@ -83,12 +80,12 @@ pub struct WorldLight {
     pub offset: f64,
     /// Radius.
     pub radius: f64,
-    /// Radiance that the *eye* sees it with through clear media: emitted radiance times (n_eye / n_light)²
-    /// (that factor not yet in it if there are [`World::light_scales`]).
+    /// The radiance that the *eye* sees through clear media: `emitted` times (n at the eye / n at the light)². If there are
+    /// [`World::light_scales`], that factor is not included.
     pub radiance: DVec3,
-    /// Radiance that it emits, as the scene says.
+    /// The radiance that it emits, from the scene.
     pub emitted: DVec3,
-    /// Identity of its plane, shared with coincident planar faces.
+    /// Identity of its plane, shared with flat faces that coincide.
     pub face: u32,
     /// Line in the scene file.
     pub line: usize,
@@ -110,12 +107,12 @@ pub struct WorldCamera {
     pub medium: u32,
 }
 
-/// The key of part `part` of surface number `number`: lights come first, then the primitives.
+/// The key of part `part` of surface number `number`. Lights are numbered first, then primitives.
 pub fn key(number: usize, part: usize) -> u32 {
     (4 * number + part) as u32
 }
 
-/// The identity of the face with this key, if nothing that is met earlier coincides with it; 0 is no face.
+/// The identity of the face with this key, unless the face coincides with one that is met earlier. 0 means no face.
 pub fn face(key: u32) -> u32 {
     key + 1
 }
@@ -125,21 +122,21 @@ pub fn face(key: u32) -> u32 {
 pub struct World {
     /// world position = (scene position - origin) / unit.
     pub origin: DVec3,
-    /// A power of two; 1 but where the scene's lengths are out of the ordinary.
+    /// A power of two; 1 unless lengths of the scene are extreme.
     pub unit: f64,
     /// The camera for a picture of the size given to [`World::new`].
     pub camera: WorldCamera,
-    /// Scattering models that something has, each once.
+    /// The scattering models that are in use, each once.
     pub materials: Vec<Bsdf>,
-    /// Lights that can be met at all; they are met before anything that coincides with them.
+    /// Lights that some ray can meet. A ray meets a light before anything that coincides with it.
     pub lights: Vec<WorldLight>,
-    /// Primitives that can be met at all, in the order in which coincident ones are met: disks,
-    /// cylinders, planes, spheres, each sorted by what it is, but coincident ones in file order.
+    /// Primitives that some ray can meet: disks, cylinders, planes, then spheres. Each kind is in the order of
+    /// [`Canonical`]. Of primitives that coincide, a ray meets the first.
     pub primitives: Vec<WorldPrimitive>,
-    /// Index of refraction of every medium, relative to air: air's, then those of the solids.
+    /// Index of refraction of every medium, relative to air: first of air, then of the solids.
     pub indices: Vec<f64>,
-    /// (n_eye / n)² of every medium where a light may lie in several: a path that ends on a light in medium m
-    /// sees its radiance times element m. `None` where every light lies in one.
+    /// (n at the eye / n)² of every medium, if some light may lie in several media. A path that ends on a light in medium m
+    /// sees the light's radiance times element m. `None` if every light lies in one medium.
     pub light_scales: Option<Vec<f64>>,
 }
 
@@ -149,7 +146,8 @@ impl World {
         Self::of(&Canonical::new(scene), size)
     }
 
-    /// The same of a scene that was put in order: nothing depends on the order of the file that means nothing.
+    /// The same as [`World::new`], of a scene in canonical order. The world depends on the order of the file only where
+    /// surfaces coincide.
     pub fn of(scene: &Canonical, size: [u32; 2]) -> Self {
         let scene_origin = origin::choose_origin(scene.scene());
         let unit = origin::choose_unit(scene.scene(), scene_origin);
@@ -240,7 +238,7 @@ impl World {
     }
 }
 
-/// Whatever lies wholly behind an opaque plane is out of every path's reach.
+/// Removes what lies wholly behind an opaque plane, where no path comes.
 fn drop_what_no_path_reaches(
     lights: &mut Vec<WorldLight>,
     primitives: &mut Vec<WorldPrimitive>,
@@ -254,7 +252,7 @@ fn drop_what_no_path_reaches(
             _ => None,
         })
         .collect();
-    // `reach`: how far a thing extends towards the eye's side of a wall. What touches it stays.
+    // `reach` says how far a thing extends from `center` towards the eye's side of a wall. A thing that touches the wall stays.
     let reachable = |center: DVec3, reach: &dyn Fn(DVec3) -> f64, size: f64| {
         walls
             .iter()

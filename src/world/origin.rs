@@ -1,13 +1,14 @@
-//! Where f32 is fine and wide enough: the world's origin and its unit of length, and spheres too large for the ordinary form.
+//! What keeps the world's numbers within f32: its origin, its unit of length, and another form for spheres that are very large.
 
 use super::{Geometry, WorldLight, WorldPrimitive};
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
-/// The middle of eye, lights and things of ordinary size if f32 coordinates about the file's origin would
-/// be too coarse for some radius (one part in 10⁴), else the file's own origin, whose zeros make simpler
-/// arithmetic.
+/// The origin of the world, in coordinates of the file.
+///
+/// It is the file's own origin, whose zeros make for simpler arithmetic, unless f32 coordinates are too coarse there: rounding would
+/// move something by more than 10⁻⁴ of its radius. Then it is the middle of the eye, the lights and the things of ordinary size.
 pub(super) fn choose_origin(scene: &Scene) -> DVec3 {
     let mut sized: Vec<(DVec3, f64)> = scene.lights.iter().map(|l| (l.center, l.radius)).collect();
     for p in &scene.primitives {
@@ -28,7 +29,7 @@ pub(super) fn choose_origin(scene: &Scene) -> DVec3 {
     }
     sized.sort_by(|a, b| a.1.total_cmp(&b.1));
     let median = sized[sized.len() / 2].1;
-    // Walls made of huge spheres have their centres far away.
+    // Huge spheres that serve as walls are left out, for their centres are far away.
     let ordinary = sized
         .iter()
         .filter(|(_, r)| *r <= 10.0 * median)
@@ -37,18 +38,17 @@ pub(super) fn choose_origin(scene: &Scene) -> DVec3 {
     middle.iter().sum::<DVec3>() / middle.len() as f64
 }
 
-/// Lengths whose fourth powers, and whatever products of them a compiler may form on the way to a number without unit, are
-/// well within f32.
+/// Lengths whose fourth powers are well within f32. A compiler may form such products on the way to a number that has no unit.
 const ORDINARY_LENGTHS: RangeInclusive<f64> = 1e-8..=1e8;
 
-/// The unit of length: 1, but where some radius or distance from the origin is out of the ordinary the power of two nearest the
-/// middle, on a logarithmic scale, of the smallest and the largest. Dividing by it rounds nothing.
+/// The unit of length. It is 1, unless some radius or distance from the origin is outside [`ORDINARY_LENGTHS`]. Then it is a power of
+/// two, near the middle of the smallest and the largest length on a logarithmic scale. Division by it rounds nothing.
 pub(super) fn choose_unit(scene: &Scene, origin: DVec3) -> f64 {
-    let (mut least, mut greatest) = (f64::INFINITY, 0.0f64);
-    let mut reach = |distance: f64| greatest = greatest.max(distance);
+    let (mut smallest, mut largest) = (f64::INFINITY, 0.0f64);
+    let mut reach = |distance: f64| largest = largest.max(distance);
     reach(scene.camera.eye.distance(origin));
     let mut sized = |center: DVec3, radius: f64| {
-        least = least.min(radius);
+        smallest = smallest.min(radius);
         reach(center.distance(origin) + radius);
     };
     for l in &scene.lights {
@@ -68,17 +68,17 @@ pub(super) fn choose_unit(scene: &Scene, origin: DVec3) -> f64 {
     }
     for p in &scene.primitives {
         if let Shape::Plane { point, normal } = p.shape {
-            greatest = greatest.max(normal.dot(point - origin).abs());
+            largest = largest.max(normal.dot(point - origin).abs());
         }
     }
-    if least > greatest
-        || [least, greatest]
+    if smallest > largest
+        || [smallest, largest]
             .iter()
             .all(|x| ORDINARY_LENGTHS.contains(x))
     {
         return 1.0;
     }
-    (0.5 * (least.log2() + greatest.log2())).round().exp2()
+    (0.5 * (smallest.log2() + largest.log2())).round().exp2()
 }
 
 /// The scene with every length divided by `unit`.
@@ -107,8 +107,8 @@ pub(super) fn in_units(scene: &Scene, unit: f64) -> Scene {
     s
 }
 
-/// Spheres more than 50 times as large as all that is smaller get the curvature form: in f32 the
-/// ordinary one would place their surface only to 10⁻⁷ of the radius.
+/// Gives a sphere the form of [`Geometry::HugeSphere`] if it is more than 50 times as large as everything smaller, and its centre is
+/// far away. In f32 the ordinary form places a surface only to 10⁻⁷ of the radius.
 pub(super) fn find_huge_spheres(
     primitives: &mut [WorldPrimitive],
     lights: &[WorldLight],
@@ -139,7 +139,7 @@ pub(super) fn find_huge_spheres(
     for (radius, center, i) in spheres {
         let distance = center.length();
         if radius > 50.0 * extent && distance > 0.5 * radius {
-            // The surface point nearest the origin lies on the line through the centre.
+            // The point of the surface nearest the origin lies on the line from the origin to the centre.
             let normal = -center / distance;
             primitives[i].geometry = Geometry::HugeSphere {
                 pole: center + normal * radius,
@@ -194,7 +194,7 @@ mod tests {
         for exponent in [-46, -40, 40, 46] {
             let scale = f64::from(exponent).exp2();
             let world = World::new(&still_life(scale), [8, 6]);
-            // Of an eighth and some six and a half.
+            // The smallest length is an eighth, and the largest about six and a half.
             assert_eq!(world.unit, scale, "2^{exponent}");
             assert_eq!(world.camera, plain.camera);
             assert_eq!(world.lights, plain.lights);
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_of_every_kind_are_brought_to_the_middle() {
+    fn the_unit_lies_between_the_smallest_and_the_largest_length() {
         let mut scene = still_life(1.0);
         scene.lights[0].radius = 2e-14;
         scene.camera.eye.z = 300.0;

@@ -1,12 +1,13 @@
 //! A bounding volume hierarchy whose nodes are numbered like those of a heap: node k has the children 2k and 2k + 1.
 //!
-//! So a walk needs no stack: one bit for each level says whether the sibling is still to be visited, and its number
-//! follows from the node's own. Numbers that would need more levels than are there are the price: a node never holds more
-//! boxes than its level has room for, of which there is twice what a balanced tree needs, enough for the surface
-//! area heuristic to part most nodes as it likes.
+//! A walk through such a tree needs no stack. One bit for each level says whether the sibling is still to be visited, and the
+//! number of the sibling follows from the number of the node. In exchange the number of levels is fixed, so a node must never hold
+//! more boxes than the levels below it have room for. That room is twice what a balanced tree needs, which lets the surface
+//! area heuristic split most nodes as it likes.
 //!
-//! The builder is our own. `obvhs` was tried: it had not ended after a minute over thirty thousand equal boxes, for it looks for pairs of
-//! which each is the other's nearest, and `bvh`, not tried, brings a linear algebra of its own; neither numbers nodes so.
+//! The builder is our own. The crate `obvhs` had not finished after a minute with thirty thousand equal boxes, because it looks for
+//! pairs of boxes of which each is nearest to the other. The crate `bvh` brings its own linear algebra, and was not tried. Neither
+//! numbers nodes in this way.
 
 use super::Geometry;
 use glam::DVec3;
@@ -14,14 +15,14 @@ use glam::DVec3;
 /// An axis-aligned box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
-    /// Least coordinates.
+    /// Smallest coordinates.
     pub min: DVec3,
-    /// Greatest coordinates.
+    /// Largest coordinates.
     pub max: DVec3,
 }
 
 impl Bounds {
-    /// Of the points within `reach` of `center`, axis by axis.
+    /// The box of the points within `reach` of `center`, axis by axis.
     pub fn about(center: DVec3, reach: DVec3) -> Self {
         Self {
             min: center - reach,
@@ -29,7 +30,7 @@ impl Bounds {
         }
     }
 
-    /// Of a disk.
+    /// The box around a disk.
     pub fn disk(center: DVec3, normal: DVec3, radius: f64) -> Self {
         let across = (DVec3::ONE - normal * normal).max(DVec3::ZERO);
         Self::about(
@@ -47,7 +48,7 @@ impl Bounds {
 }
 
 impl Geometry {
-    /// The box around it; `None` for what has no bounds, or bounds that say nothing.
+    /// The box around it; `None` for a plane, which has none, and for a huge sphere, whose box would hold everything.
     pub fn bounds(&self) -> Option<Bounds> {
         match *self {
             Self::Plane { .. } | Self::HugeSphere { .. } => None,
@@ -71,19 +72,19 @@ impl Geometry {
     }
 }
 
-/// A node; without an item and with its least corner beyond the greatest it is empty.
+/// A node. An inner node has no item. An empty node has no item either, and its `min` is beyond its `max`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
-    /// Least coordinates of the box, rounded outwards.
+    /// Smallest coordinates of the box, rounded outwards.
     pub min: [f32; 3],
-    /// Greatest coordinates.
+    /// Largest coordinates.
     pub max: [f32; 3],
-    /// Number of the box that a leaf stands for.
+    /// The number of its box, for a leaf.
     pub item: Option<u32>,
 }
 
 impl Node {
-    /// No ray meets it.
+    /// A node that no ray meets.
     pub const EMPTY: Self = Self {
         min: [2e30; 3],
         max: [-2e30; 3],
@@ -94,14 +95,15 @@ impl Node {
 /// A hierarchy over numbered boxes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tree {
-    /// Node 1 is the root, and a leaf if there is one box; 0 is empty. As many as [`Tree::numbers`] says.
+    /// Node 1 is the root; it is a leaf if there is one box. Node 0 is empty. There are [`Tree::numbers`] nodes.
     pub nodes: Vec<Node>,
 }
 
-/// A numbered box. They are sorted themselves, not their numbers: a million lie too far apart to be looked up.
+/// A numbered box. The builder sorts these entries, not their numbers: a million boxes do not fit the caches, so looking boxes up by
+/// number would be slow.
 #[derive(Clone, Copy)]
 struct Entry {
-    around: Box32,
+    bounds: Box32,
     item: u32,
 }
 
@@ -113,20 +115,21 @@ struct Box32 {
 }
 
 impl Box32 {
-    /// Of nothing.
+    /// The box of nothing.
     const EMPTY: Self = Self {
         min: [f32::INFINITY; 3],
         max: [f32::NEG_INFINITY; 3],
     };
 
-    /// Around one in f64 whose corners may have been rounded to f32 already: a step farther on each side. Not to a subnormal
-    /// number, or one near: a processor takes a hundred cycles for a product with it, and things stand on floors at 0.
+    /// A box in f32 that holds `b` even after the corners of what it bounds were rounded to f32: it is one step larger on
+    /// each side. No coordinate is near the subnormal numbers, with which a processor takes a hundred cycles for a product. They
+    /// would be common, because things stand on floors at 0.
     fn outwards(b: &Bounds) -> Self {
-        const LEAST: f32 = 1e-25;
-        let clear = |x: f32, instead: f32| if x.abs() < LEAST { instead } else { x };
+        const TINY: f32 = 1e-25;
+        let normal = |x: f32, instead: f32| if x.abs() < TINY { instead } else { x };
         Self {
-            min: (b.min.to_array()).map(|x| clear((x as f32).next_down(), -LEAST)),
-            max: (b.max.to_array()).map(|x| clear((x as f32).next_up(), LEAST)),
+            min: (b.min.to_array()).map(|x| normal((x as f32).next_down(), -TINY)),
+            max: (b.max.to_array()).map(|x| normal((x as f32).next_up(), TINY)),
         }
     }
 
@@ -137,28 +140,28 @@ impl Box32 {
         }
     }
 
-    /// Half the surface area; 0 of nothing.
+    /// Half the surface area; 0 for the box of nothing.
     fn half_area(&self) -> f64 {
         let [x, y, z] = [0, 1, 2].map(|k| f64::from((self.max[k] - self.min[k]).max(0.0)));
         x * y + y * z + z * x
     }
 
-    /// Twice the middle along an axis.
-    fn middle(&self, axis: usize) -> f32 {
+    /// Twice the coordinate of the middle along an axis.
+    fn twice_middle(&self, axis: usize) -> f32 {
         self.min[axis] + self.max[axis]
     }
 }
 
-/// Parts in which a split may lie along each axis.
+/// The number of bins along each axis. A split lies between two bins.
 const BINS: usize = 16;
 
-/// Parts the items of a node in two, neither of none nor of more than `room`, by the surface area heuristic where that can
-/// tell them apart, else in halves; returns how many are in the first part.
+/// Splits the items of a node in two parts, and returns how many are in the first. Neither part is empty, or has more than `room`
+/// items. The surface area heuristic decides; where it cannot tell the items apart, the parts are halves.
 fn split(items: &mut [Entry], room: usize) -> usize {
     let mut best: Option<(f64, usize, f32)> = None;
     let mut longest: (f32, usize) = (0.0, 0);
     for axis in 0..3 {
-        let middle = |e: &Entry| e.around.middle(axis);
+        let middle = |e: &Entry| e.bounds.twice_middle(axis);
         let (low, high) = range(items.iter().map(middle));
         let scale = BINS as f32 / (high - low);
         if high <= low || !scale.is_finite() {
@@ -170,11 +173,11 @@ fn split(items: &mut [Entry], room: usize) -> usize {
         let mut bins = [(Box32::EMPTY, 0usize); BINS];
         for i in items.iter() {
             let bin = &mut bins[bin_of(middle(i), low, scale)];
-            bin.0.add(&i.around);
+            bin.0.add(&i.bounds);
             bin.1 += 1;
         }
-        // Costs of all that lies right of each border, then of both sides. Nodes of few items, which are most, leave most bins
-        // empty: behind such a bin a border parts nothing else than before it.
+        // First the costs of all items to the right of each border, then those of both sides. A border behind an empty bin splits
+        // the items as the border before it does, and is skipped. Most nodes have few items, and most of their bins are empty.
         let mut right = [0.0; BINS];
         let (mut around, mut count, mut cost) = (Box32::EMPTY, 0, 0.0);
         for k in (1..BINS).rev() {
@@ -193,22 +196,22 @@ fn split(items: &mut [Entry], room: usize) -> usize {
             around.add(&bins[k - 1].0);
             count += bins[k - 1].1;
             let cost = around.half_area() * count as f64 + right[k];
-            let parts = count < items.len();
+            let splits = count < items.len();
             let fits = count <= room && items.len() - count <= room;
-            if parts && fits && best.is_none_or(|b| cost < b.0) {
+            if splits && fits && best.is_none_or(|b| cost < b.0) {
                 best = Some((cost, axis, k as f32));
             }
         }
     }
     let Some((_, axis, border)) = best else {
         let half = items.len() / 2;
-        let middle = |e: &Entry| e.around.middle(longest.1);
+        let middle = |e: &Entry| e.bounds.twice_middle(longest.1);
         items.select_nth_unstable_by(half, |a, b| {
             middle(a).total_cmp(&middle(b)).then(a.item.cmp(&b.item))
         });
         return half;
     };
-    let middle = |e: &Entry| e.around.middle(axis);
+    let middle = |e: &Entry| e.bounds.twice_middle(axis);
     let (low, high) = range(items.iter().map(middle));
     let scale = BINS as f32 / (high - low);
     let mut first = 0;
@@ -231,7 +234,7 @@ fn bin_of(x: f32, low: f32, scale: f32) -> usize {
     (((x - low) * scale) as usize).min(BINS - 1)
 }
 
-/// Levels below the root of a tree of so many boxes.
+/// Levels below the root of a tree with this many boxes.
 fn levels(boxes: usize) -> u32 {
     match boxes {
         0..=1 => 0,
@@ -240,13 +243,13 @@ fn levels(boxes: usize) -> u32 {
     }
 }
 
-/// Boxes with fewer are not worth another thread.
-const LEAST_APART: usize = 1 << 14;
+/// A node with fewer items is not worth another thread.
+const MIN_PARALLEL: usize = 1 << 14;
 
-/// Makes a node and all below it of these items. `rows` are the places of all these nodes, one row a level.
+/// Makes the node of these items, and all nodes below it. `rows` are the places of these nodes, one row for each level.
 fn build(items: &mut [Entry], mut rows: Vec<&mut [Node]>) {
-    if items.len() < LEAST_APART {
-        // What is still to be made: levels of nodes, their places there, and their items.
+    if items.len() < MIN_PARALLEL {
+        // Nodes that are still to be made: the level of each, its place there, and its items.
         let mut open = vec![(0, 0, 0..items.len())];
         while let Some((level, at, range)) = open.pop() {
             let middle = range.start + node(&mut items[range.clone()], &mut rows[level..], at);
@@ -267,14 +270,14 @@ fn build(items: &mut [Entry], mut rows: Vec<&mut [Node]>) {
     rayon::join(|| build(first, left), || build(second, right));
 }
 
-/// Makes the node that has place `at` in the first of `rows`, if it has any items, and parts these; returns how many are in the
-/// first half.
+/// Makes the node at place `at` in the first of `rows`, unless it has no items, and splits its items. Returns how many of them are in
+/// the first part.
 fn node(items: &mut [Entry], rows: &mut [&mut [Node]], at: usize) -> usize {
     if items.is_empty() {
         return 0;
     }
     let mut around = Box32::EMPTY;
-    items.iter().for_each(|e| around.add(&e.around));
+    items.iter().for_each(|e| around.add(&e.bounds));
     rows[0][at] = Node {
         min: around.min,
         max: around.max,
@@ -287,17 +290,17 @@ fn node(items: &mut [Entry], rows: &mut [&mut [Node]], at: usize) -> usize {
 }
 
 impl Tree {
-    /// How many node numbers a tree of so many boxes has.
+    /// The number of nodes of a tree with this many boxes, empty ones included.
     pub fn numbers(boxes: usize) -> usize {
         2 << levels(boxes)
     }
 
-    /// Of boxes with finite corners, numbered in their order: one box a leaf.
+    /// The tree of these boxes, which have finite corners and are numbered in their order. Each leaf has one box.
     pub fn new(boxes: &[Bounds]) -> Self {
         let mut items: Vec<Entry> = (0..)
             .zip(boxes)
             .map(|(item, b)| Entry {
-                around: Box32::outwards(b),
+                bounds: Box32::outwards(b),
                 item,
             })
             .collect();
@@ -312,12 +315,12 @@ impl Tree {
         Self { nodes }
     }
 
-    /// Calls `found` with the number of every box that touches `around`.
-    pub fn touching(&self, around: &Bounds, mut found: impl FnMut(usize)) {
+    /// Calls `found` with the number of every box that touches `bounds`.
+    pub fn touching(&self, bounds: &Bounds, mut found: impl FnMut(usize)) {
         let Box32 {
             min: low,
             max: high,
-        } = Box32::outwards(around);
+        } = Box32::outwards(bounds);
         let mut open = vec![1];
         while let Some(k) = open.pop() {
             let node = &self.nodes[k];
@@ -341,7 +344,7 @@ mod tests {
             .collect()
     }
 
-    /// Spread over a cube, the same every time.
+    /// Points spread over a cube, the same every time.
     fn scattered(i: usize) -> DVec3 {
         let part = |k: f64| (i as f64 * k).fract() * 10.0;
         DVec3::new(part(0.618_034), part(0.414_214), part(0.732_051))
@@ -379,7 +382,7 @@ mod tests {
 
     #[test]
     fn a_giant_and_dust_at_all_scales_have_room() {
-        // Each a tenth as far away as the last: the heuristic would like to part them one by one.
+        // Each box is a tenth as far away as the last. The heuristic would like to split them off one by one.
         let places = |i: usize| DVec3::splat(10f64.powi(10 - (i % 40) as i32));
         for count in [40, 63, 64, 65, 1000] {
             let tree = Tree::new(&boxes(count, places, 1e-4));

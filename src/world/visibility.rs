@@ -1,10 +1,11 @@
-//! What can come between a point that a path reaches and a light.
+//! Which surfaces can come between a light and a point that a path reaches.
 
-use super::{Bounds, COINCIDENT, Geometry, Side, Tree, World, WorldLight};
+use super::{Bounds, Geometry, Side, Tree, World, WorldLight};
+use crate::coincidence::{COINCIDENT, slack};
 use glam::DVec3;
 use std::collections::BTreeSet;
 
-/// By number, whether a surface can lie between a point that a path reaches and a light.
+/// For each surface, by its number, whether it can lie between a light and a point that a path reaches.
 pub(crate) fn blockers(world: &World) -> Vec<bool> {
     let hull = hull_faces(world);
     (0..world.surface_count())
@@ -12,13 +13,13 @@ pub(crate) fn blockers(world: &World) -> Vec<bool> {
         .collect()
 }
 
-/// Faces of the convex hull that holds every light: opaque planes that no light reaches behind. A segment from a point in
-/// front of such a plane to a light never crosses it.
+/// The faces of opaque planes that have every light wholly in front. They are walls of a convex hull around the lights: a segment to a
+/// light never crosses such a plane if it starts in front.
 fn hull_faces(world: &World) -> BTreeSet<u32> {
     let in_front = |normal: DVec3, offset: f64| {
         world.lights.iter().all(|l| {
             let lowest = normal.dot(l.center) - l.radius * normal.cross(l.normal).length();
-            lowest >= offset - COINCIDENT * l.radius
+            lowest >= offset - slack(l.radius)
         })
     };
     world
@@ -35,18 +36,18 @@ fn hull_faces(world: &World) -> BTreeSet<u32> {
         .collect()
 }
 
-/// Whether a surface can lie between a point that a path reaches and a light.
+/// Whether a surface can lie between a light and a point that a path reaches.
 fn can_block(world: &World, number: usize, hull: &BTreeSet<u32>) -> bool {
     let Some(p) = world.primitive(number) else {
-        // Flush on the hull it is as much out of the way as the hull; and lights of one plane are never between each
-        // other and a point.
+        // A light. Flush on a wall of the hull it blocks as little as the wall does. And if all lights lie in one plane, none can
+        // block another.
         let face = world.lights[number].face;
         return !hull.contains(&face) && world.lights.iter().any(|l| l.face != face);
     };
     match p.geometry {
         Geometry::Plane { .. } => !(p.side == Side::Outside && hull.contains(&p.faces[0])),
         Geometry::Disk { .. } => !hull.contains(&p.faces[0]),
-        // The solid around the eye is convex: it hides no light that lies inside it.
+        // A solid around the eye is convex, so it hides no light that lies inside it.
         Geometry::Sphere { center, radius } if p.side == Side::Inside => {
             !world.lights.iter().all(|l| {
                 let v = l.center - center;
@@ -68,6 +69,7 @@ fn can_block(world: &World, number: usize, hull: &BTreeSet<u32>) -> bool {
     }
 }
 
+/// Whether a light lies inside a cylinder, or touches it from inside.
 fn light_in_cylinder(
     l: &WorldLight,
     base: DVec3,
@@ -79,13 +81,13 @@ fn light_in_cylinder(
     let reach = l.radius * axis.cross(l.normal).length();
     let v = l.center - base;
     let out = (v - axis * axis.dot(v)).length() + l.radius;
-    let slack = COINCIDENT * radius;
+    let slack = slack(radius);
     height - reach >= offsets[0] - slack
         && height + reach <= offsets[1] + slack
         && out <= radius + slack
 }
 
-/// Whether two lights share a plane and some of it, where the first in the file hides the others.
+/// Whether any two lights lie in one plane and overlap there. The first of them in the file hides the other.
 pub(crate) fn lights_overlap(world: &World) -> bool {
     let boxes: Vec<Bounds> = world
         .lights
@@ -98,9 +100,9 @@ pub(crate) fn lights_overlap(world: &World) -> bool {
         .iter()
         .zip(&boxes)
         .enumerate()
-        .any(|(i, (a, around))| {
+        .any(|(i, (a, bounds))| {
             let mut overlap = false;
-            tree.touching(around, |k| {
+            tree.touching(bounds, |k| {
                 let b = &world.lights[k];
                 overlap |=
                     k < i && a.face == b.face && a.center.distance(b.center) < a.radius + b.radius;

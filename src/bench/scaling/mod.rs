@@ -18,7 +18,7 @@ use crate::kernel::BAKED_LIMIT;
 use crate::run::{CALL, Job, Run, StopReason, Tally};
 use crate::scene::{Diagnostic, Scene, generate};
 use crate::settings::{Overrides, Settings};
-use crate::world::{MOST_LOOKED_AT, World};
+use crate::world::{MAX_SCANNED_LIGHTS, World};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -193,7 +193,7 @@ impl Scaling {
 
     /// The largest count for which gpu-tree weighs every light when it chooses one.
     pub fn looked_at_up_to(&self) -> Option<usize> {
-        let most = MOST_LOOKED_AT.checked_sub(self.other_lights)?;
+        let most = MAX_SCANNED_LIGHTS.checked_sub(self.other_lights)?;
         (self.series == Series::Lights && self.has(EngineKind::GpuTree)).then_some(most)
     }
 

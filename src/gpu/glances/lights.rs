@@ -9,7 +9,7 @@ use glam::DVec3;
 struct DirectLight {
     /// Pixels that a ball around the light may touch.
     pixels: FilmBox,
-    /// From the eye to the light's center.
+    /// From the eye to the light's centre.
     to: DVec3,
     normal: DVec3,
     radius: f64,

@@ -3,7 +3,7 @@
 //! A *glance* is an extra camera ray that gathers nothing but the light that it sees directly, or by way of mirrors and glass. The
 //! edge of a light, and of its image in a mirror, is by far the noisiest thing in most pictures, and a camera ray costs a tenth
 //! of a path. So the kernel sends several glances for each sample of a pixel that may show a light. The path of that sample then
-//! leaves out the light that its glances have already seen.
+//! leaves out the light that its glances have already seen. The kernel's side is in `shaders/glance/`.
 //!
 //! The host decides which pixels get glances, and tells the kernel with one [`Mark`] a pixel. Any choice of marks gives the same
 //! expected picture. A missing mark costs noise, and a needless one costs time. A pixel is marked

@@ -1,25 +1,25 @@
 //! Form factors in closed form, from points to rectangles and disks.
 //!
-//! An integral over a rectangle is the difference of one antiderivative at its corners, so that a grid of rectangles
-//! costs an evaluation a node.
+//! An integral over a rectangle is a sum of one antiderivative at its corners, with signs. So a grid of rectangles costs one
+//! evaluation for each node.
 
 use std::f64::consts::PI;
 
-/// Antiderivative in x and y of the form factor from a point, height `d` over the origin and parallel to the
-/// plane of (`x`, `y`), to an element of that plane: d²/(π (x² + y² + d²)²).
+/// Antiderivative in x and y of the form factor d²/(π (x² + y² + d²)²) from a receiver to an element of a plane at (`x`, `y`). The
+/// receiver is a point at height `d` over the origin of the plane, and is parallel to the plane.
 pub fn point_parallel(x: f64, y: f64, d: f64) -> f64 {
     let (a, b) = (x.hypot(d), y.hypot(d));
     (x / a * (y / a).atan() + y / b * (x / b).atan()) / (2.0 * PI)
 }
 
-/// The same from a point that faces along +x: x d/(π (x² + y² + d²)²). `x` >= 0 and `d` >= 0, not both 0.
+/// The same for a receiver that faces along +x: x d/(π (x² + y² + d²)²). `x` >= 0 and `d` >= 0, and not both are 0.
 pub fn point_across(x: f64, y: f64, d: f64) -> f64 {
     let s = x.hypot(d);
     -d / (2.0 * PI * s) * (y / s).atan()
 }
 
-/// Form factors to a disk of radius `r` from a point `a` off its axis and `h` > 0 before it, as long as the point's
-/// horizon does not cut the disk: for a receiver parallel to the disk, and for one facing the axis.
+/// Form factors to a disk of radius `r` from a point at distance `a` from its axis and height `h` > 0 in front of it. The first is for
+/// a receiver parallel to the disk, and the second for a receiver that faces the axis, if its horizon does not cut the disk.
 pub fn disk(a: f64, h: f64, r: f64) -> [f64; 2] {
     let s = a * a + h * h - r * r;
     let q = s.hypot(2.0 * h * r);
@@ -32,11 +32,11 @@ pub fn disk(a: f64, h: f64, r: f64) -> [f64; 2] {
     [h * cap / q, 2.0 * h * r * r * a / (q * (z + q))]
 }
 
-/// The area that a disk about the origin shares with the rectangle `x` times `y`.
+/// The area that a disk around the origin has in common with the rectangle `x` times `y`.
 pub fn disk_in_rectangle(r: f64, x: [f64; 2], y: [f64; 2]) -> f64 {
     let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
-    // Green's theorem: what each edge spans as seen from the centre, a triangle where the edge runs in the disk, a
-    // sector where it runs outside.
+    // Green's theorem: the sum of the areas that the edges span with the centre. That is a triangle where an edge is inside the disk,
+    // and a sector where it is outside.
     (0..4)
         .map(|k| spanned(r, corners[k], corners[(k + 1) % 4]))
         .sum()

@@ -1,10 +1,10 @@
-//! A referee that shares no method with the path tracers: radiosity in a box of six diffuse walls with disk lights flush
-//! on them.
+//! Radiosity in a box of six diffuse walls with disk lights flush on them. It is a check on the path tracers, and shares no method
+//! with them.
 //!
-//! The walls are cut into patches, B = E + ρ Σ F B is solved for their mean radiosities [Goral1984], and the radiance
-//! of a point is gathered from the solution once more. Direct light and the form factors from points are closed forms
-//! ([`form_factor`]). Lights absorb what falls on them; a patch that a light covers in part shines with the rest of its
-//! area. What is left is the error of patches of constant radiosity, which falls as their area.
+//! The walls are cut into patches, and B = E + ρ Σ F B is solved for their mean radiosities [Goral1984]. The radiance of a point is
+//! then gathered from that solution. Direct light and the form factors from points are closed forms ([`form_factor`]). Lights
+//! absorb what falls on them. A patch that a light covers in part reflects with the rest of its area. The error that remains comes from
+//! patches of constant radiosity, and is proportional to their area.
 
 pub mod form_factor;
 
@@ -15,19 +15,19 @@ use rayon::prelude::*;
 use std::array::from_fn;
 use std::f64::consts::PI;
 
-/// The iteration ends when no radiosity changes by more than this part of the brightest.
+/// The iteration ends when no radiosity changes by more than this fraction of the brightest.
 const CONVERGED: f64 = 1e-10;
 
-/// Patches of the last bounce to a side of one of the others.
+/// Each patch is divided into this many along each side for the last bounce.
 const FINER: usize = 2;
 
-/// An axis-parallel box. Wall 2a + s lies across axis a, at the lower (s = 0) or upper (s = 1) end; its patches are
-/// numbered along axis a + 1, then along a + 2 (mod 3).
+/// An axis-parallel box. Wall 2a + s is perpendicular to axis a, at its lower end (s = 0) or its upper end (s = 1). The patches of a
+/// wall are numbered along axis a + 1 first, then along axis a + 2 (mod 3).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Room {
     /// Lower and upper corner.
     corners: [DVec3; 2],
-    /// Of each wall.
+    /// Reflectance of each wall.
     reflectance: [DVec3; 6],
     lights: Vec<Lamp>,
 }
@@ -46,21 +46,21 @@ struct Lamp {
 pub struct Solution {
     room: Room,
     grid: Grid,
-    /// Of each patch, wall by wall, times the part of its area that no light covers.
+    /// Mean radiosity of each patch, wall by wall, times the fraction of its area that no light covers.
     shining: Vec<DVec3>,
 }
 
 /// How the walls are cut into patches.
 #[derive(Debug, Clone)]
 struct Grid {
-    /// Patches a side of a wall.
+    /// Patches along each side of a wall.
     n: usize,
-    /// Their ends along each axis.
+    /// The ends of patches along each axis.
     nodes: [Vec<f64>; 3],
 }
 
 impl Room {
-    /// The room that a scene is, or what it has that a room has not.
+    /// The room that a scene describes, or the reason why it is not a room.
     pub fn new(scene: &Scene) -> Result<Self, String> {
         let mut corners = [DVec3::NAN; 2];
         let mut reflectance = [DVec3::NAN; 6];
@@ -104,7 +104,7 @@ impl Room {
         Ok(room)
     }
 
-    /// The wall, and the point of it, that is seen from `eye` in the room along `direction`.
+    /// The wall that an `eye` in the room sees along `direction`, and the point that it sees there.
     pub fn seen(&self, eye: DVec3, direction: DVec3) -> (usize, DVec3) {
         let (t, wall) = (0..6)
             .filter(|&w| inward(w).dot(direction) < 0.0)
@@ -114,7 +114,7 @@ impl Room {
         (wall, eye + direction * t)
     }
 
-    /// Distance on its wall from `point` to the nearest light's rim; negative on a light, infinite without one.
+    /// Distance from `point` to the rim of the nearest light on the same wall. It is negative on a light, and infinite without one.
     pub fn distance_to_light(&self, wall: usize, point: DVec3) -> f64 {
         self.lights
             .iter()
@@ -123,8 +123,8 @@ impl Room {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Solves for `n` x `n` patches a wall, and divides each by [`FINER`] a side for the last bounce, in which direct
-    /// light's bends then matter less.
+    /// The solution with `n` x `n` patches on each wall. For the last bounce each patch is divided further ([`FINER`]), so that
+    /// variation of direct light within a patch matters less.
     pub fn solve(&self, n: usize) -> Solution {
         let grid = Grid::new(self, n);
         let patches = grid.patches();
@@ -132,7 +132,7 @@ impl Room {
         let rows: Vec<(DVec3, Vec<f64>)> = patches.par_iter().map(row).collect();
         let reflected: Vec<DVec3> = patches.iter().map(|&(w, e)| self.reflected(w, e)).collect();
         let mut shining = vec![DVec3::ZERO; patches.len()];
-        // Gauss and Seidel's iteration: what is new is used at once.
+        // Gauss-Seidel iteration: new values are used at once.
         loop {
             let (mut change, mut brightest) = (0.0f64, 0.0f64);
             for (k, (direct, factors)) in rows.iter().enumerate() {
@@ -157,7 +157,7 @@ impl Room {
         }
     }
 
-    /// The part of what falls on a patch that goes back into the room: none where lights cover it.
+    /// The fraction of the light falling on a patch that it reflects. Where lights cover the patch it reflects none.
     fn reflected(&self, wall: usize, [x, y]: [[f64; 2]; 2]) -> DVec3 {
         let [u, v] = across_of(wall);
         let lights = self.lights.iter().filter(|l| l.wall == wall);
@@ -169,12 +169,12 @@ impl Room {
         self.reflectance[wall] * (1.0 - covered)
     }
 
-    /// Where a wall's plane lies on its axis.
+    /// The coordinate of a wall's plane on its axis.
     fn plane(&self, wall: usize) -> f64 {
         self.corners[wall % 2][wall / 2]
     }
 
-    /// Irradiance of a point of `wall` straight from the lights.
+    /// Irradiance of a point of `wall` directly from the lights.
     fn direct(&self, wall: usize, p: DVec3) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for l in self.lights.iter().filter(|l| l.wall != wall) {
@@ -182,7 +182,7 @@ impl Room {
             let h = normal.dot(p - l.center);
             let to_axis = normal * h - (p - l.center);
             let [parallel, across] = form_factor::disk(to_axis.length(), h, l.radius);
-            // A wall either faces the light's or stands across it, with the whole light before it.
+            // A wall is either opposite that of the light, or perpendicular to it with the whole light in front.
             sum += l.radiance
                 * PI
                 * if wall / 2 == l.wall / 2 {
@@ -196,7 +196,7 @@ impl Room {
 }
 
 impl Solution {
-    /// Radiance that leaves a point of `wall` where no light covers it.
+    /// The radiance that leaves a point of `wall` that no light covers.
     pub fn radiance(&self, wall: usize, p: DVec3) -> DVec3 {
         let mut row = vec![0.0; self.shining.len()];
         self.grid.add_row(&self.room, wall, p, 1.0, &mut row);
@@ -215,7 +215,7 @@ impl Grid {
         Self { n, nodes }
     }
 
-    /// Wall and ends along the wall's two axes of every patch.
+    /// Every patch: its wall, and its ends along the two axes of the wall.
     fn patches(&self) -> Vec<(usize, [[f64; 2]; 2])> {
         let patch = |k: usize| {
             let (wall, i) = (k / (self.n * self.n), k % (self.n * self.n));
@@ -226,8 +226,8 @@ impl Grid {
         (0..6 * self.n * self.n).map(patch).collect()
     }
 
-    /// Irradiance of a rectangle of `wall`, given by its ends, straight from the lights, and its form factors to all
-    /// patches: means over it, by Gauss's rule of two points a side.
+    /// For a rectangle of `wall`, given by its ends: the irradiance directly from the lights, and the form factors to all patches.
+    /// Both are means over the rectangle, by Gauss's rule with two points along each side.
     fn mean_row(&self, room: &Room, wall: usize, [x, y]: [[f64; 2]; 2]) -> (DVec3, Vec<f64>) {
         let [u, v] = across_of(wall);
         let places = [0.5 - 0.75f64.sqrt() / 3.0, 0.5 + 0.75f64.sqrt() / 3.0];
@@ -254,7 +254,7 @@ impl Grid {
             }
             let [u, v] = across_of(source);
             let d = (p[source / 2] - room.plane(source)).abs();
-            // Where the wall stands across the source, the way the point faces.
+            // The direction that the point faces along the axis of its wall, if that is perpendicular to the source.
             let ahead = inward(wall)[wall / 2];
             let corner = |j: usize, k: usize| {
                 let (x, y) = (self.nodes[u][j] - p[u], self.nodes[v][k] - p[v]);
@@ -277,7 +277,7 @@ impl Grid {
     }
 }
 
-/// Irradiance through form factors.
+/// Irradiance, from form factors and radiosities.
 fn sum_of(factors: &[f64], radiosities: &[DVec3]) -> DVec3 {
     factors.iter().zip(radiosities).map(|(f, b)| *b * *f).sum()
 }
@@ -292,7 +292,7 @@ fn inward(wall: usize) -> DVec3 {
     DVec3::AXES[wall / 2] * if wall.is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
-/// Number, place on its axis, and reflectance of the wall that a primitive is.
+/// The wall that a primitive describes: its number, its coordinate on its axis, and its reflectance.
 fn wall_of(scene: &Scene, p: &Primitive) -> Result<(usize, f64, DVec3), String> {
     let Bsdf::Diffuse { reflectance } = scene.materials[p.material].bsdf else {
         return Err(format!("line {}: not diffuse", p.line));

@@ -5,7 +5,7 @@ use super::{Warnings, called, is_dielectric};
 use crate::coincidence::{COINCIDENT, Flat};
 use crate::scene::{Place, Scene, Shape};
 
-/// In the order in which coincident surfaces are met.
+/// Kinds of surface, in the order in which surfaces that coincide are met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Rank {
     Light,
@@ -25,7 +25,7 @@ struct Face {
 struct Thing {
     kind: &'static str,
     place: Place,
-    /// None for lights.
+    /// `None` for lights.
     shape: Option<Shape>,
     material: Option<usize>,
     dielectric: bool,
@@ -39,8 +39,8 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     for (i, a) in things.iter().enumerate() {
         for b in &things[i + 1..] {
             if let Some((rank_a, rank_b)) = suspect(a, b) {
-                // `a` is a light, or before `b` among the primitives; the file's order decides
-                // between surfaces of equal rank.
+                // `a` is a light, or before `b` among the primitives. The order of the file decides between surfaces of
+                // equal rank.
                 let a_first = (rank_a, a.place.line) <= (rank_b, b.place.line);
                 let (first, second) = if a_first { (a, b) } else { (b, a) };
                 warnings.add(second.place, || {
@@ -90,7 +90,7 @@ fn faces(shape: &Shape) -> Vec<Face> {
     flats.map(|flat| Face { rank, flat }).collect()
 }
 
-/// The ranks of two surfaces that coincide and should not.
+/// The ranks of two surfaces that coincide and should not; `None` if there are none.
 fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
     let both_opaque = !a.dielectric && !b.dielectric;
     let alike = both_opaque && a.material.is_some() && a.material == b.material;

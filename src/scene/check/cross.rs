@@ -28,7 +28,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     warnings
 }
 
-/// Whether the surfaces cross, deeper than coincidence.
+/// Whether the surfaces cross, by more than the tolerance within which they coincide.
 fn cross(a: &Shape, b: &Shape) -> bool {
     let slack = slack(size(a).min(size(b)));
     match (*a, *b) {
@@ -65,8 +65,7 @@ fn cross(a: &Shape, b: &Shape) -> bool {
                 radius: r,
             },
         ) => {
-            // The cylinder's surface is in one piece: it crosses the sphere if some of it is within
-            // and some without.
+            // The cylinder's surface is connected: it crosses the sphere if some of it is inside and some outside.
             let nearest = signed_distance(b, center).abs();
             let farthest = farthest_on_cylinder(base, top, r, center);
             nearest < radius - slack && farthest > radius + slack
@@ -79,7 +78,7 @@ fn cross(a: &Shape, b: &Shape) -> bool {
     }
 }
 
-/// Whether some points of `a`'s surface are inside `b`, and some outside; `a` is in one piece.
+/// Whether some points of `a`'s surface are inside `b`, and some outside.
 fn partly_inside(a: &Shape, b: &Shape, slack: f64) -> bool {
     let (mut inside, mut outside) = (false, false);
     for p in points_on_cylinder(a, b) {
@@ -90,8 +89,8 @@ fn partly_inside(a: &Shape, b: &Shape, slack: f64) -> bool {
     inside && outside
 }
 
-/// Points spread over the surface of the cylinder `a`, and some where it comes near `b`'s axis, so
-/// that thin rods do not slip between.
+/// Points spread over the surface of the cylinder `a`, and more points where it comes near the axis of `b`, so that thin rods do not
+/// slip between them.
 fn points_on_cylinder(a: &Shape, b: &Shape) -> Vec<DVec3> {
     /// Points on each cap, and rings along the side.
     const FINENESS: usize = 32;
@@ -115,7 +114,7 @@ fn points_on_cylinder(a: &Shape, b: &Shape) -> Vec<DVec3> {
         .map(|i| length * i as f64 / FINENESS as f64)
         .collect();
     heights.extend([along(b0), along(b1)]);
-    // Where the two axes come nearest each other; parallel ones do so everywhere.
+    // Where the two axes are nearest each other. Parallel ones are so everywhere.
     let other = b1 - b0;
     let across = other - axis * axis.dot(other);
     if across.length_squared() > 0.0 {
@@ -129,7 +128,7 @@ fn points_on_cylinder(a: &Shape, b: &Shape) -> Vec<DVec3> {
             let turn = k as f64 / FINENESS as f64 * std::f64::consts::TAU;
             points.push(base + axis * h + (x * turn.cos() + y * turn.sin()) * radius);
         }
-        // The point of the ring that faces b's axis.
+        // The point of the ring that faces the axis of `b`.
         let center = base + axis * h;
         let s = (center - b0).dot(other) / other.length_squared();
         let towards = b0 + other * s.clamp(0.0, 1.0) - center;

@@ -1,14 +1,14 @@
-//! Where the eye is: in a solid, on a surface, on a light.
+//! An eye in a solid, on a surface, or on a light.
 
 use super::geometry::{disk_of, signed_distance, size};
 use super::{Warnings, called};
 use crate::coincidence;
 use crate::scene::{Bsdf, Scene, Shape};
 
-/// Just before a light, in its radii: where its light begins.
+/// How far in front of a light the point is, in radii of the light, that decides which solid it shines in.
 const BEFORE: f64 = 1e-3;
 
-/// Warnings about the eye's place.
+/// Warnings about the place of the eye.
 pub(super) fn warnings(scene: &Scene) -> Warnings {
     let eye = scene.camera.eye;
     let view = eye.distance(scene.camera.look_at);
@@ -48,7 +48,7 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     warnings
 }
 
-/// Whether any light shines in the solid.
+/// Whether any light shines inside the solid.
 fn holds_light(scene: &Scene, solid: &Shape) -> bool {
     scene.lights.iter().any(|l| {
         let before = l.center + l.normal * (BEFORE * l.radius);

@@ -52,14 +52,14 @@ pub(super) fn signed_distance(shape: &Shape, p: DVec3) -> f64 {
     }
 }
 
-/// Distance from `p` to the farthest point of a cylinder's surface, which is on a rim.
+/// Distance from `p` to the farthest point of a cylinder's surface. That point is on a rim.
 pub(super) fn farthest_on_cylinder(base: DVec3, top: DVec3, radius: f64, p: DVec3) -> f64 {
     let at = InCylinder::new(base, top, p);
     let height = at.height.abs().max((at.length - at.height).abs());
     height.hypot(at.rho + radius)
 }
 
-/// Its own length scale; infinite for planes.
+/// The length that the tolerance is relative to; infinite for planes.
 pub(super) fn size(shape: &Shape) -> f64 {
     match *shape {
         Shape::Plane { .. } => f64::INFINITY,

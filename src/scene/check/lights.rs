@@ -6,9 +6,9 @@ use crate::coincidence::{COINCIDENT, in_plane, slack};
 use crate::scene::{Light, Primitive, Scene, Shape};
 use glam::DVec3;
 
-/// Something this near before a light, in its radii, covers it.
+/// Something in front of a light covers it if it is nearer than this, in radii of the light.
 const COVER: f64 = 1e-3;
-/// Points on a light from which to look for a cover.
+/// The number of points on a light from which to look for a cover.
 const POINTS: usize = 64;
 
 /// Lights that emit nothing.
@@ -23,7 +23,7 @@ pub(super) fn black(scene: &Scene) -> Warnings {
     warnings
 }
 
-/// Lights with something opaque right before half of their front or more.
+/// Lights with something opaque directly in front of at least half of their face.
 pub(super) fn covered(scene: &Scene) -> Warnings {
     let opaque = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
     let primitives = opaque.map(|p| (p.shape, p.shape.kind(), p.line));
@@ -32,8 +32,8 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
 
     let mut warnings = Warnings::default();
     for l in &scene.lights {
-        // Off the light itself and off what it is flush on: whether that is before or behind is
-        // no matter of distance.
+        // Start in front of the light itself and of what it is flush on. Distance does not say whether a flush surface is in front
+        // or behind.
         let start = 2.0 * slack(l.radius);
         let reach = COVER * l.radius;
         let is_covered = |shape: &Shape| {
@@ -60,7 +60,7 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
     warnings
 }
 
-/// Lights whose front lies beyond an opaque plane, or within an opaque solid, that the eye does not.
+/// Lights on the other side of an opaque plane than the eye, and lights inside an opaque solid that the eye is outside of.
 pub(super) fn unseen(scene: &Scene) -> Warnings {
     let eye = scene.camera.eye;
     let walls: Vec<&Primitive> = scene
@@ -84,7 +84,7 @@ pub(super) fn unseen(scene: &Scene) -> Warnings {
     warnings
 }
 
-/// How an opaque shape keeps all light of `l` from the eye for certain, to precede its name.
+/// How an opaque shape certainly hides all light of `l` from the eye, in words that precede the shape's name.
 fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
     let slack = slack(l.radius);
     match *shape {
@@ -120,12 +120,12 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
     }
 }
 
-/// Whether the light lies in the plane with this normal, over which its center is at this height.
+/// Whether the light lies in the plane with this normal, over which its centre is at this height.
 fn flush(normal: DVec3, l: &Light, height: f64) -> bool {
     in_plane([normal, l.normal], height, l.radius, COINCIDENT)
 }
 
-/// Whether the light lies on a cap with its front to the cylinder's inside.
+/// Whether the light lies on a cap of the cylinder and faces its inside.
 fn faces_into_cap(shape: &Shape, l: &Light, slack: f64) -> bool {
     let Shape::Cylinder { base, top, radius } = *shape else {
         return false;

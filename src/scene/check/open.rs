@@ -4,22 +4,22 @@ use super::geometry::{directions, disk_of, hit};
 use super::{Warnings, is_dielectric};
 use crate::scene::{Place, Scene, Shape};
 
-/// Rays tried, evenly in all directions.
+/// The number of rays, spread evenly over all directions.
 const RAYS: usize = 1000;
-/// The most intersections calculated; larger scenes get fewer rays, but at least [`FEW_RAYS`].
-const WORK: usize = 20_000_000;
-/// Enough to find half an open sky.
-const FEW_RAYS: usize = 20;
+/// The largest number of intersections to calculate. Large scenes get fewer rays, but at least [`MIN_RAYS`].
+const MAX_WORK: usize = 20_000_000;
+/// Enough rays to find a half-open sky.
+const MIN_RAYS: usize = 20;
 
-/// Whether rays from the eye leave the scene. Dielectrics are looked straight through.
+/// Warns if rays from the eye leave the scene. Rays pass straight through dielectrics.
 pub(super) fn warnings(scene: &Scene) -> Warnings {
     let opaque = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
     let lights = scene.lights.iter().map(disk_of);
     let mut shapes: Vec<Shape> = opaque.map(|p| p.shape).chain(lights).collect();
-    // Walls first: they stop most rays.
+    // Walls come first, because they stop most rays.
     shapes.sort_by_key(|s| !matches!(s, Shape::Plane { .. }));
 
-    let rays = (WORK / shapes.len().max(1)).clamp(FEW_RAYS, RAYS);
+    let rays = (MAX_WORK / shapes.len().max(1)).clamp(MIN_RAYS, RAYS);
     let eye = scene.camera.eye;
     let leaving = directions(rays)
         .filter(|&d| shapes.iter().all(|s| hit(s, eye, d).is_none()))

@@ -1,18 +1,17 @@
-//! Ray against convex solid by search and bisection on a distance-like function, for the unit tests beside this
-//! file.
+//! Where a ray meets a convex solid, by search and bisection. Only unit tests use it.
 
 use super::Ray;
 use crate::reference::sampler::Sampler;
 use glam::DVec3;
 
-/// Half the length of ray that is searched.
+/// Distance from the ray's origin to which its line is searched, in both directions.
 const REACH: f64 = 50.0;
 
 /// Where a ray's line enters and leaves the convex solid {p : f(p) <= 0}, f convex; `None` if it misses.
 pub fn span(ray: &Ray, f: impl Fn(DVec3) -> f64) -> Option<[f64; 2]> {
     let along = |t: f64| f(ray.at(t));
     let (mut lo, mut hi) = (-REACH, REACH);
-    // A convex function's minimum, by ternary search; after 300 steps 100·(2/3)³⁰⁰ is left.
+    // Ternary search for the minimum of a convex function. After 300 steps an interval of 100·(2/3)³⁰⁰ is left.
     for _ in 0..300 {
         let (a, b) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
         if along(a) < along(b) {
@@ -40,23 +39,23 @@ fn bisect(mut outside: f64, mut inside: f64, f: &impl Fn(f64) -> f64) -> f64 {
     inside
 }
 
-/// Panics unless both miss or both hit at the same distance. Rays that all but miss are excused.
+/// Panics unless both miss, or both hit at the same distance.
 pub fn assert_same_hit(ray: &Ray, found: Option<f64>, expected: Option<f64>) {
     match (found, expected) {
         (None, None) => {}
-        // Near a tangent the distance turns with the square root of the rounding, √10⁻¹⁵.
+        // Near a tangent the distance changes with the square root of the rounding, √10⁻¹⁵.
         (Some(a), Some(b)) => assert!((a - b).abs() < 1e-7, "{ray:?}: {a}, bisection says {b}"),
         _ => panic!("{ray:?}: {found:?}, bisection says {expected:?}"),
     }
 }
 
-/// Uniform in a cube of half width `half`.
+/// A point, uniform in a cube of half width `half`.
 pub fn random_point(rng: &mut Sampler, half: f64) -> DVec3 {
     let mut coordinate = || half * (2.0 * rng.uniform() - 1.0);
     DVec3::new(coordinate(), coordinate(), coordinate())
 }
 
-/// Uniform on the sphere.
+/// A direction, uniform on the sphere.
 pub fn random_direction(rng: &mut Sampler) -> DVec3 {
     let z = 2.0 * rng.uniform() - 1.0;
     crate::reference::frame::direction_about(DVec3::Y, z, (1.0 - z * z).sqrt(), rng.uniform())

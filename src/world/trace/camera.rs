@@ -3,7 +3,7 @@
 use super::Ray;
 use crate::world::WorldCamera;
 
-/// The ray through film position (`x`, `y`), in pixels from the top left corner of a picture of `size`.
+/// The ray through the point (`x`, `y`) of the film, in pixels from the top left corner of a picture of `size`.
 pub fn camera_ray(camera: &WorldCamera, size: [u32; 2], x: f64, y: f64) -> Ray {
     let right = x - f64::from(size[0]) / 2.0;
     let down = y - f64::from(size[1]) / 2.0;

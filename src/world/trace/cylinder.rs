@@ -1,21 +1,21 @@
-//! Solid cylinders: the interval of the side cut with the interval of the caps, so that the rim has no gap.
+//! Solid cylinders. A ray is in the solid where it is both within the side and between the caps, so the rim has no gap.
 
 use super::Ray;
 use super::plane;
 use glam::DVec3;
 
-/// Rays whose squared sine with the axis is below this never reach the side within any scene: at 10⁻¹² rad it
-/// takes a length of 10¹² radii.
+/// A ray whose squared sine with the axis is below this does not reach the side in any scene: at 10⁻¹² rad that takes a length
+/// of 10¹² radii.
 const PARALLEL: f64 = 1e-24;
 
 /// Position of the side in [`Cylinder::faces`].
 pub const SIDE: usize = 0;
-/// Position of the cap at `base` in [`Cylinder::faces`]; the other cap follows.
+/// Position of the cap at `base` in [`Cylinder::faces`].
 pub const BASE: usize = 1;
 /// Position of the cap at the far end in [`Cylinder::faces`].
 pub const TOP: usize = 2;
 
-/// A solid cylinder as in [`Geometry::Cylinder`](crate::world::Geometry::Cylinder).
+/// A solid cylinder, like [`Geometry::Cylinder`](crate::world::Geometry::Cylinder).
 #[derive(Debug, Clone, Copy)]
 pub struct Cylinder {
     /// Centre of the base cap.
@@ -30,13 +30,13 @@ pub struct Cylinder {
     pub faces: [u32; 3],
 }
 
-/// A distance along a ray and which face lies there.
+/// A distance along a ray, and the position of the face met there in [`Cylinder::faces`].
 pub type Crossing = (f64, usize);
 
 impl Cylinder {
-    /// Distance >= 0 from outside, and the face met.
+    /// Distance >= 0 from outside, and the face met there.
     ///
-    /// A ray that rounding has put just inside meets it at once if the way out is longer than the way back.
+    /// A ray that rounding has put just inside meets the cylinder at distance 0 if the way out ahead is longer than the way back.
     pub fn enter(&self, ray: &Ray) -> Option<Crossing> {
         if ray.face == self.faces[SIDE] {
             return None;
@@ -53,16 +53,16 @@ impl Cylinder {
         hits.then_some((enter.0.max(0.0), enter.1))
     }
 
-    /// Distance >= 0 from inside, and the face met.
+    /// Distance >= 0 from inside, and the face met there.
     pub fn leave(&self, ray: &Ray) -> Crossing {
         let side = self.side_span(ray).map_or(0.0, |s| s[1]);
-        // A ray that rounding has put beyond a cap, going along it, is held by the side alone.
+        // A ray parallel to the caps, which rounding has put beyond one of them, meets the side alone.
         let far = self.cap_span(ray).map_or((f64::INFINITY, TOP), |s| s[1]);
         let (t, face) = if side < far.0 { (side, SIDE) } else { far };
         (t.max(0.0), face)
     }
 
-    /// Where the ray's line is within the infinite cylinder.
+    /// The part of the ray's line that is within the infinite cylinder.
     fn side_span(&self, ray: &Ray) -> Option<[f64; 2]> {
         let across = |v: DVec3| v - self.axis * self.axis.dot(v);
         let m = across(ray.origin - self.base);
@@ -93,7 +93,7 @@ impl Cylinder {
         Some([t0.min(t1), t0.max(t1)])
     }
 
-    /// Where the ray's line is between the cap planes.
+    /// The part of the ray's line that is between the planes of the caps.
     fn cap_span(&self, ray: &Ray) -> Option<[Crossing; 2]> {
         let at = |end: usize| {
             plane::distance(self.axis, self.offsets[end], self.faces[BASE + end], ray)
@@ -110,7 +110,7 @@ impl Cylinder {
         }
     }
 
-    /// `p` put back on face number `face`, and the outward unit normal there.
+    /// `p` moved onto the face at position `face`, and the outward unit normal there.
     pub fn project(&self, face: usize, p: DVec3) -> (DVec3, DVec3) {
         match face {
             SIDE => {

@@ -7,9 +7,9 @@ use glam::DVec3;
 /// What a boundary does with light at one angle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fresnel {
-    /// Fraction of the power that is transmitted, 0..=1; the rest is reflected.
+    /// Fraction of the power that is transmitted, in 0..=1. The rest is reflected.
     pub transmittance: f64,
-    /// Cosine between the refracted ray and the normal; 0 at and beyond the critical angle.
+    /// Cosine of the angle between the refracted ray and the normal; 0 at and beyond the critical angle.
     pub cos_transmitted: f64,
 }
 
@@ -39,8 +39,8 @@ impl Boundary {
     }
 }
 
-/// `cosine` in 0..=1 of the angle of incidence; `eta` is the index beyond the boundary divided by the index on
-/// this side. Transmission is computed as such: near grazing 1 - F would lose its digits.
+/// Fresnel's equations. `cosine`, in 0..=1, is that of the angle of incidence. `eta` is the index beyond the boundary, divided by
+/// the index on this side. The transmittance is computed directly, because near grazing incidence 1 - F would lose its digits.
 pub fn fresnel(cosine: f64, eta: f64) -> Fresnel {
     // Snell: 1 - (1 - cos²)/eta².
     let cos2_transmitted = (eta * eta - 1.0 + cosine * cosine) / (eta * eta);
@@ -59,8 +59,8 @@ pub fn fresnel(cosine: f64, eta: f64) -> Fresnel {
     }
 }
 
-/// Where the ray with direction `direction` goes on from a boundary whose `normal` is turned towards it, and
-/// whether it has crossed. It crosses with the probability of its transmittance, so that the weight is 1.
+/// The new direction of a ray that meets a boundary, and whether it has crossed the boundary. `normal` points to the side that the
+/// ray comes from. The ray crosses if `u`, in 0..=1, is below the transmittance. With a random `u` the weight of either way is 1.
 pub fn sample(direction: DVec3, normal: DVec3, eta: f64, u: f64) -> (DVec3, bool) {
     let cosine = (-normal.dot(direction)).clamp(0.0, 1.0);
     let fresnel = fresnel(cosine, eta);
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn at_brewster_s_angle_half_of_the_perpendicular_light_is_all_that_returns() {
+    fn at_brewster_s_angle_only_light_polarised_across_is_reflected() {
         let brewster = GLASS.atan();
         assert!((brewster.to_degrees() - 56.6593).abs() < 1e-4);
         let s = ((GLASS * GLASS - 1.0) / (GLASS * GLASS + 1.0)).powi(2);

@@ -1,4 +1,4 @@
-//! Flat disks; lights use them too.
+//! Flat disks, among them lights.
 
 use super::Ray;
 use super::plane;
@@ -13,7 +13,7 @@ pub fn intersect(
     face: u32,
     ray: &Ray,
 ) -> Option<f64> {
-    // A ray that starts in the plane is at distance 0 of it.
+    // The distance is 0 for a ray that starts in the plane.
     let t = plane::distance(normal, offset, face, ray)?;
     let hits = t > 0.0 && ray.at(t).distance_squared(center) <= radius * radius;
     hits.then_some(t)

@@ -1,15 +1,13 @@
-//! Spheres far larger than the scene, given by their point nearest the scene and their curvature.
+//! Spheres far larger than the scene, given by the point of the surface nearest the scene, and by the curvature.
 
 use super::Ray;
-#[cfg(doc)]
-use super::sphere;
 use glam::DVec3;
 
-/// A sphere as the set k v·v + 2 n·v = 0 with v = p - pole, k = 1/radius and n the outward normal at
-/// the pole: no number in it is larger than the scene.
+/// The points p with k v·v + 2 n·v = 0, where v = p - pole, k = 1/radius, and n is the outward normal at the pole. No number in
+/// this equation is larger than the scene.
 #[derive(Debug, Clone, Copy)]
 pub struct HugeSphere {
-    /// The surface point nearest the scene.
+    /// The point of the surface nearest the scene.
     pub pole: DVec3,
     /// Outward unit normal there.
     pub normal: DVec3,
@@ -18,7 +16,7 @@ pub struct HugeSphere {
 }
 
 impl HugeSphere {
-    /// As [`sphere::enter`].
+    /// Like [`sphere::enter`](super::sphere::enter).
     pub fn enter(&self, ray: &Ray) -> Option<f64> {
         let (b, c) = self.coefficients(ray);
         let discriminant = b * b - c / self.radius;
@@ -28,7 +26,7 @@ impl HugeSphere {
         Some((c / (-b + discriminant.sqrt())).max(0.0))
     }
 
-    /// As [`sphere::leave`].
+    /// Like [`sphere::leave`](super::sphere::leave).
     pub fn leave(&self, on_it: bool, ray: &Ray) -> f64 {
         let (b, c) = self.coefficients(ray);
         if on_it {
@@ -52,7 +50,7 @@ impl HugeSphere {
         )
     }
 
-    /// As [`sphere::project`]: one Newton step along the gradient, whose length is 1 on the surface.
+    /// Like [`sphere::project`](super::sphere::project), by one Newton step along the gradient, whose length is 1 on the surface.
     pub fn project(&self, p: DVec3) -> (DVec3, DVec3) {
         let v = p - self.pole;
         let gradient = self.normal + v / self.radius;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// The direction that `direction`, going to a surface with unit normal `normal`, goes on in.
+/// The direction of a ray after its reflection at a surface with this unit normal.
 pub fn reflect(direction: DVec3, normal: DVec3) -> DVec3 {
     (direction - normal * (2.0 * normal.dot(direction))).normalize()
 }

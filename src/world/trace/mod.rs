@@ -24,16 +24,16 @@ use dielectric::Boundary;
 use glam::DVec3;
 use huge_sphere::HugeSphere;
 
-/// A ray with all that its path knows about where it starts.
+/// A ray, with what its path knows about the place where it starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Start.
+    /// Where it starts.
     pub origin: DVec3,
     /// Unit direction.
     pub direction: DVec3,
-    /// The dielectric solid it runs in; [`AIR`] for none.
+    /// The dielectric solid that it is in; [`AIR`] for none.
     pub medium: u32,
-    /// The face it starts on ([`WorldPrimitive::faces`]); 0 for none.
+    /// The face that it starts on ([`WorldPrimitive::faces`]); 0 for none.
     pub face: u32,
 }
 
@@ -47,11 +47,11 @@ impl Ray {
 /// What a ray has met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Met {
-    /// A light, by its index; `front` is the side that emits.
+    /// A light.
     Light {
         /// Index into [`World::lights`].
         index: usize,
-        /// Whether the ray has come from where the light shines.
+        /// Whether the ray has met the side that emits.
         front: bool,
     },
     /// A primitive, by its index into [`World::primitives`].
@@ -61,21 +61,21 @@ pub enum Met {
 /// Where a ray has met something.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Distance, >= 0.
+    /// Distance along the ray, >= 0.
     pub t: f64,
-    /// The point, put back on the surface.
+    /// The point met, moved onto the surface.
     pub point: DVec3,
-    /// Unit normal, turned to the side that the ray has come from.
+    /// Unit normal, on the side that the ray comes from.
     pub normal: DVec3,
-    /// Identity of the face.
+    /// Identity of the face that was met.
     pub face: u32,
-    /// What it is.
+    /// What was met.
     pub met: Met,
 }
 
 impl World {
-    /// The nearest thing met, lights first and then the primitives in the world's order: of several at one
-    /// distance the first counts.
+    /// The nearest thing that the ray meets. Of several at one distance it is the first in this order: the lights, then the
+    /// primitives, as they stand in the world.
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
         let nearer = |t: f64, nearest: &Option<Hit>| nearest.as_ref().is_none_or(|n| t < n.t);
@@ -115,8 +115,8 @@ impl World {
         nearest
     }
 
-    /// Whether something stands between the ray's start and the front of light `light`, at which the ray is
-    /// aimed. A ray that misses the light, or comes from behind it, is occluded too.
+    /// Whether a ray that is aimed at the front of light `light` meets something before it. A ray that misses the light, or comes
+    /// from behind it, counts as occluded.
     pub fn occluded(&self, ray: &Ray, light: usize) -> bool {
         let aimed_at = Met::Light {
             index: light,
@@ -153,7 +153,7 @@ impl World {
     }
 }
 
-/// Whether a ray in `medium` is inside the solid `p`; `None` if it cannot meet `p` at all. Disks have no inside.
+/// Whether a ray in `medium` is inside the solid `p`; `None` if it cannot meet `p` at all. No ray is inside a disk.
 fn is_inside(p: &WorldPrimitive, medium: u32) -> Option<bool> {
     match p.side {
         Side::Outside => Some(false),
@@ -165,7 +165,7 @@ fn is_inside(p: &WorldPrimitive, medium: u32) -> Option<bool> {
     }
 }
 
-/// Distance to `p` for a ray inside or outside it, and which of its faces is met.
+/// Distance to `p` along a ray that is inside or outside it, and the number of the face that the ray meets.
 fn meet(p: &WorldPrimitive, inside: bool, ray: &Ray) -> Option<(f64, usize)> {
     let on_it = ray.face == p.faces[0];
     match p.geometry {
@@ -227,7 +227,7 @@ fn meet(p: &WorldPrimitive, inside: bool, ray: &Ray) -> Option<(f64, usize)> {
     }
 }
 
-/// `point` put back on face number `face` of `p`, and the outward unit normal there.
+/// `point` moved onto face number `face` of `p`, and the outward unit normal there.
 fn surface(p: &WorldPrimitive, face: usize, point: DVec3) -> (DVec3, DVec3) {
     match p.geometry {
         Geometry::Disk { normal, offset, .. } | Geometry::Plane { normal, offset } => {

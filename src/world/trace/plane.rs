@@ -1,12 +1,12 @@
-//! Planes n·p = offset: infinite ones, and those that disks, lights and caps lie in.
+//! Planes n·p = offset: infinite planes, and the planes of disks, lights and caps.
 
 use super::Ray;
 use glam::DVec3;
 
-/// Distance, of either sign, along `ray` to the plane of face `face`; exactly 0 when the ray starts on that
-/// face, `None` when it runs parallel.
+/// Distance along `ray`, of either sign, to the plane of face `face`. It is exactly 0 for a ray that starts on that face, and
+/// `None` for a ray parallel to the plane.
 ///
-/// Every planar face uses this one formula, so that faces with one equation are met at bit-identical distances.
+/// All flat faces use this formula, so faces with the same equation are met at the same distance, to the last bit.
 pub fn distance(normal: DVec3, offset: f64, face: u32, ray: &Ray) -> Option<f64> {
     let along = normal.dot(ray.direction);
     if along == 0.0 {
@@ -18,8 +18,8 @@ pub fn distance(normal: DVec3, offset: f64, face: u32, ray: &Ray) -> Option<f64>
     }
 }
 
-/// Distance >= 0 to the plane for a ray that is in front of it (behind it, where `inside`), `None` unless the
-/// ray goes towards it. A ray that rounding has put on the wrong side meets it at once.
+/// Distance >= 0 to the plane for a ray in front of it, or behind it if `inside`; `None` unless the ray goes towards the plane.
+/// A ray that rounding has put on the wrong side meets the plane at distance 0.
 pub fn intersect(normal: DVec3, offset: f64, face: u32, inside: bool, ray: &Ray) -> Option<f64> {
     let along = normal.dot(ray.direction);
     let towards = if inside { along > 0.0 } else { along < 0.0 };
@@ -29,7 +29,7 @@ pub fn intersect(normal: DVec3, offset: f64, face: u32, inside: bool, ray: &Ray)
     distance(normal, offset, face, ray).map(|t| t.max(0.0))
 }
 
-/// `p` put back on the plane.
+/// `p` moved onto the plane.
 pub fn project(normal: DVec3, offset: f64, p: DVec3) -> DVec3 {
     p - normal * (normal.dot(p) - offset)
 }
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_below_the_floor_is_a_hit_at_once_and_one_s_own_plane_is_at_zero() {
+    fn a_ray_rounded_below_the_floor_or_starting_on_it_meets_it_at_distance_0() {
         let below = ray(DVec3::new(0.0, 1.0 - 1e-15, 0.0), -DVec3::Y, 0);
         assert_eq!(intersect(DVec3::Y, 1.0, 7, false, &below), Some(0.0));
         let on = ray(

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 /// Distance >= 0 to the sphere from outside.
 ///
-/// A ray that rounding has put just inside meets the sphere at once if it goes inwards, else not at all.
+/// A ray that rounding has put just inside meets the sphere at distance 0 if it goes inwards, and not at all if it goes outwards.
 pub fn enter(center: DVec3, radius: f64, ray: &Ray) -> Option<f64> {
     let f = ray.origin - center;
     let b = -f.dot(ray.direction);
@@ -17,8 +17,8 @@ pub fn enter(center: DVec3, radius: f64, ray: &Ray) -> Option<f64> {
     Some((c / (b + discriminant.sqrt())).max(0.0))
 }
 
-/// Distance >= 0 to the sphere from inside; `on_it` when the ray starts on the sphere: one root is 0, and
-/// the other then needs no square root.
+/// Distance >= 0 to the sphere from inside. If the ray starts on the sphere (`on_it`), one root is 0, and the other needs no
+/// square root.
 pub fn leave(center: DVec3, radius: f64, on_it: bool, ray: &Ray) -> f64 {
     let f = ray.origin - center;
     let b = -f.dot(ray.direction);
@@ -35,13 +35,13 @@ pub fn leave(center: DVec3, radius: f64, on_it: bool, ray: &Ray) -> f64 {
     t.max(0.0)
 }
 
-/// r² less the squared distance from the centre to the ray's line.
+/// r² minus the squared distance from the centre to the line of the ray.
 fn discriminant(f: DVec3, b: f64, radius: f64, direction: DVec3) -> f64 {
     let nearest = f + b * direction;
     radius * radius - nearest.length_squared()
 }
 
-/// `p` put back on the sphere, and the outward unit normal there.
+/// `p` moved onto the sphere, and the outward unit normal there.
 pub fn project(center: DVec3, radius: f64, p: DVec3) -> (DVec3, DVec3) {
     let normal = (p - center).normalize();
     (center + normal * radius, normal)
