@@ -8,7 +8,7 @@ use crate::world::{Node, Tree, World, visibility};
 
 /// What of a scene lies on the device, by how its kernel reaches it.
 #[derive(Debug, Clone)]
-pub(super) enum Packed {
+pub enum Packed {
     /// Nothing: all is in the kernel's text.
     Baked,
     /// Arrays for storage buffers.
@@ -19,7 +19,7 @@ pub(super) enum Packed {
 
 /// Arrays; none is empty, for WGSL has no empty arrays.
 #[derive(Debug, Clone)]
-pub(super) struct Buffers {
+pub struct Buffers {
     /// Lights first, then the world's primitives.
     pub surfaces: Vec<Surface>,
     /// In the world's order.
@@ -170,7 +170,7 @@ fn pack_records(world: &World) -> Vec<[u32; 4]> {
 }
 
 /// Packs a world for kernels of this kind.
-pub(super) fn pack(world: &World, access: Access) -> Packed {
+pub fn pack(world: &World, access: Access) -> Packed {
     match access {
         Access::Baked => Packed::Baked,
         Access::Buffers => Packed::Buffers(Buffers::new(world).or_defaults()),

@@ -165,7 +165,7 @@ macro_rules! records {
         $(#[$about])*
         #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable, Default)]
         #[repr(C)]
-        pub(crate) struct $name { $(pub $field: $kind,)* }
+        pub struct $name { $(pub $field: $kind,)* }
 
         impl $name {
             /// The scalars of every field, as names after the dot and literals.
