@@ -104,7 +104,7 @@ fn load_pixel(pixel: Pixel) -> PixelFilm {
 }
 
 // Stores the sum of replicate k, and word k of the counts.
-fn store_replicate(pixel: Pixel, film: PixelFilm, k: u32) {
+fn store_replicate(pixel: Pixel, film: ptr<function, PixelFilm>, k: u32) {
     let sum = select(select(film.sum_0, film.sum_1, k == 1u), select(film.sum_2, film.sum_3, k == 3u), k >= 2u);
     textureStore(running_out, pixel.texel, k, sum);
     counters[4u * pixel.index + k] = select(

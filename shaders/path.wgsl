@@ -35,14 +35,14 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     }
     var film = load_pixel(pixel);
     let sight = sight_of(film.mark);
-    begin_trips(film);
+    begin_trips(&film);
     var path: Path;
     begin_path(&path, true, camera_path(pixel, film.s, sight.glances, sight), sight.glances, vec3f(0.0));
     // The host keeps the turns of this loop below the driver's limit on loop trips, or the kernel counts them.
     while film.s < film.end && trips_remain() {
         next_turn(&path, pixel, sight, &film);
     }
-    store_pixel(pixel, film);
+    store_pixel(pixel, &film);
 }
 
 // One vertex of a path.
@@ -53,22 +53,22 @@ fn trace_vertex(path: ptr<function, Path>, pixel: Pixel, sight: Sight, film: ptr
     let meets_light = hit.key < LIGHT_KEYS;
 
     // A light ends the path.
-    if meets_light && sees_lights(*path, sight) {
-        path.radiance += path.beta * emission(*path, hit) * share_of_light(*path, sight);
+    if meets_light & sees_lights(path, sight) {
+        path.radiance += path.beta * emission(path, hit) * share_of_light(path, sight);
     }
 
     // A surface sends it on, or ends it.
-    let meets_surface = !meets_light && hit.key != NONE && looks_on(*path, sight);
+    let meets_surface = !meets_light & (hit.key != NONE) & looks_on(path, sight);
     // Some surface there always is, whatever was met: lanes that met none go through the motions.
     let met = Hit(hit.t, select(0u, hit.key, meets_surface));
     let lives = spend_trips(film, scatter_if(meets_surface, path, met, pixel, sight, film));
 
     // Add the sample of a path that has ended and start the next at once: no lane waits for a longer path.
-    let is_sample = !lives && !is_glance(*path);
+    let is_sample = !lives & !is_glance(path);
     add_sample(film, path.radiance, is_sample);
-    keep_counts(*film, is_sample);
-    let glances = glances_after(*path, sight);
-    let seen = select(vec3f(0.0), path.radiance, is_glance(*path));
+    keep_counts(film, is_sample);
+    let glances = glances_after(path, sight);
+    let seen = select(vec3f(0.0), path.radiance, is_glance(path));
     begin_path(path, !lives, camera_path(pixel, film.s, glances, sight), glances, seen);
 }
 
@@ -88,9 +88,9 @@ fn begin_path(path: ptr<function, Path>, ended: bool, ray: Ray, glances: u32, se
     path.shown = select(path.shown, 1.0, ended);
     path.radiance = select(path.radiance, seen, ended);
     path.depth = select(path.depth, 1u, ended);
-    path.specular = path.specular || ended;
-    path.all_specular = path.all_specular || ended;
-    path.only_lights = path.only_lights && !ended;
+    path.specular = path.specular | ended;
+    path.all_specular = path.all_specular | ended;
+    path.only_lights = path.only_lights & !ended;
     path.glances = select(path.glances, glances, ended);
     begin_trail(path, ended);
 }

@@ -82,7 +82,7 @@ fn draw_vertex(key: vec4u, first: bool, glossy: bool) -> Draws {
         select(u.light_point, spread.light_point, first),
         select(u.direction, spread.direction, first),
         select(u.light, spread.light, first),
-        select(u.lobe, spread.lobe, first && glossy),
+        select(u.lobe, spread.lobe, first & glossy),
         u.roulette,
         u.spare
     );

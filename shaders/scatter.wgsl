@@ -19,29 +19,29 @@ fn interaction(ray: Ray, hit: Hit, way: u32) -> Interaction {
 }
 
 fn is_specular(material: Material) -> bool {
-    return is_mirror(material) || is_dielectric(material);
+    return is_mirror(material) | is_dielectric(material);
 }
 
 // Gathers direct light at `hit` and sends the path on. False if the path ends there, or meets no surface.
 fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) -> bool {
-    let x = interaction(path.ray, hit, way_at_glass(*path, pixel, film.s, sight));
+    let x = interaction(path.ray, hit, way_at_glass(path, pixel, film.s, sight));
     let specular = is_specular(x.material);
 
     // Does it end here? The vertex on the light counts too, so nothing can be gathered beyond the last one.
-    let wanted = meets && !(WHITTED && path.only_lights) && (specular || !is_glance(*path)) && trail_goes_on(path.trail, x);
+    let wanted = meets & !(WHITTED & path.only_lights) & (specular | !is_glance(path)) & trail_goes_on(path.trail, x);
     let last = path.depth >= LAST_DEPTH;
-    count_truncated(film, COUNT_TRUNCATED && last && wanted);
-    let goes_on = wanted && !last;
+    count_truncated(film, COUNT_TRUNCATED & last & wanted);
+    let goes_on = wanted & !last;
 
     // Direct light, where the surface scatters into more than one direction.
-    let key = vec4u(pixel.key, film.s, path.depth, vertex_seed(*path));
+    let key = vec4u(pixel.key, film.s, path.depth, vertex_seed(path));
     let u = draw_vertex(key, path.all_specular, is_phong(x.material));
     let receiver = receiver_at(x);
-    let direct = direct_light_if(goes_on && !specular, x, receiver, key, u, path.depth, film);
+    let direct = direct_light_if(goes_on & !specular, x, receiver, key, u, path.depth, film);
     // Not even zero is added where nothing is asked: beta may have left f32.
     let gathered = path.beta * (direct.radiance * light_scale(x.medium));
-    path.radiance += select(vec3f(0.0), gathered, goes_on && !specular);
-    path.only_lights = path.only_lights || (WHITTED && !specular);
+    path.radiance += select(vec3f(0.0), gathered, goes_on & !specular);
+    path.only_lights = path.only_lights | (WHITTED & !specular);
 
     // A new direction.
     var scattered = sample_bsdf(x, u);
@@ -64,11 +64,11 @@ const ROULETTE_SHARE: f32 = 0.7;
 fn survives_roulette(path: ptr<function, Path>, scattered: Scattered, u: f32) -> bool {
     let beta = path.beta * scattered.weight;
     let brightest = fmax(fmax(beta.x, beta.y), beta.z);
-    let all_specular = path.all_specular && scattered.specular && !is_sent(path.trail);
-    path.shown = select(path.shown, brightest, path.all_specular && !all_specular);
+    let all_specular = path.all_specular & scattered.specular & !is_sent(path.trail);
+    path.shown = select(path.shown, brightest, path.all_specular & !all_specular);
     path.all_specular = all_specular;
     // Glances are few and short, and what they show is to be free of noise.
-    let spared = is_glance(*path) || is_sent(path.trail);
+    let spared = is_glance(path) | is_sent(path.trail);
     let survival = select(fmin(1.0, brightest / fmax(ROULETTE_SHARE * path.shown, TINY)), 1.0, spared);
     path.beta = beta * (1.0 / fmax(survival, TINY));
     return brightest > 0.0 && u < survival;

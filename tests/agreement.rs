@@ -131,7 +131,7 @@ fn faults_are_seen(s: &Scene) -> Result<(), Failed> {
     for (right, wrong) in [
         // The path sees again what extra camera rays have seen in a mirror.
         (
-            "!path.all_specular || path.depth > sight.depth",
+            "!path.all_specular | (path.depth > sight.depth)",
             "path.depth > min(sight.depth, 1u)",
         ),
         // What glass reflects and what it lets through, as if each were half of the light.

@@ -10,6 +10,6 @@ fn direct_light(asks: bool, x: Interaction, to: Receiver, key: vec4u, u: Draws, 
 }
 
 // Light met by chance counts in full.
-fn chance_weight(path: Path, light: DiskLight, index: u32) -> f32 {
+fn chance_weight(path: ptr<function, Path>, light: DiskLight, index: u32) -> f32 {
     return 1.0;
 }

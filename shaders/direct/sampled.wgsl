@@ -37,7 +37,7 @@ fn light_sample(asks: bool, x: Interaction, to: Receiver, u: LightDraws, depth: 
 }
 
 // The weight of a light that the path meets by chance, where light sampling looked for it as well.
-fn chance_weight(path: Path, light: DiskLight, index: u32) -> f32 {
+fn chance_weight(path: ptr<function, Path>, light: DiskLight, index: u32) -> f32 {
     var weight = select(0.0, 1.0, path.specular);
     if MIS && !path.specular && path.pdf > 0.0 {
         let receiver = path.ray.o;

@@ -11,30 +11,30 @@ fn sight_of(mark: u32) -> Sight {
     return Sight(0u, 1u);
 }
 
-fn is_glance(path: Path) -> bool {
+fn is_glance(path: ptr<function, Path>) -> bool {
     return false;
 }
 
-fn sees_lights(path: Path, sight: Sight) -> bool {
+fn sees_lights(path: ptr<function, Path>, sight: Sight) -> bool {
     return true;
 }
 
-fn share_of_light(path: Path, sight: Sight) -> f32 {
+fn share_of_light(path: ptr<function, Path>, sight: Sight) -> f32 {
     return 1.0;
 }
 
-fn looks_on(path: Path, sight: Sight) -> bool {
+fn looks_on(path: ptr<function, Path>, sight: Sight) -> bool {
     return true;
 }
 
-fn glances_after(path: Path, sight: Sight) -> u32 {
+fn glances_after(path: ptr<function, Path>, sight: Sight) -> u32 {
     return 0u;
 }
 
-fn vertex_seed(path: Path) -> u32 {
+fn vertex_seed(path: ptr<function, Path>) -> u32 {
     return params.seed;
 }
 
-fn way_at_glass(path: Path, pixel: Pixel, s: u32, sight: Sight) -> u32 {
+fn way_at_glass(path: ptr<function, Path>, pixel: Pixel, s: u32, sight: Sight) -> u32 {
     return BY_CHANCE;
 }

@@ -18,44 +18,44 @@ struct Sight {
 
 fn sight_of(mark: u32) -> Sight {
     let depth = mark & 0xffu;
-    let directly = (mark >> DIRECT_SHIFT) == 1u || !GLANCE_CHAINS;
+    let directly = ((mark >> DIRECT_SHIFT) == 1u) | !GLANCE_CHAINS;
     let across = select(CHAIN_GLANCES, GLANCES, directly);
     return Sight(select(0u, across * across, depth > 0u), across, depth, (mark >> BRANCH_SHIFT) & 0xffu);
 }
 
-fn is_glance(path: Path) -> bool {
+fn is_glance(path: ptr<function, Path>) -> bool {
     return path.glances > 0u;
 }
 
 // Whether the path gathers a light that it meets now.
-fn sees_lights(path: Path, sight: Sight) -> bool {
-    return is_glance(path) || !path.all_specular || path.depth > sight.depth;
+fn sees_lights(path: ptr<function, Path>, sight: Sight) -> bool {
+    return is_glance(path) | !path.all_specular | (path.depth > sight.depth);
 }
 
 // A glance counts for its share of the sample.
-fn share_of_light(path: Path, sight: Sight) -> f32 {
+fn share_of_light(path: ptr<function, Path>, sight: Sight) -> f32 {
     return select(1.0, 1.0 / f32(sight.across * sight.across), is_glance(path));
 }
 
 // Whether the path goes on from a surface that it meets now.
-fn looks_on(path: Path, sight: Sight) -> bool {
-    return !is_glance(path) || (GLANCE_CHAINS && path.depth < sight.depth);
+fn looks_on(path: ptr<function, Path>, sight: Sight) -> bool {
+    return !is_glance(path) | (GLANCE_CHAINS & (path.depth < sight.depth));
 }
 
 // Glances to be sent when this path has ended.
-fn glances_after(path: Path, sight: Sight) -> u32 {
+fn glances_after(path: ptr<function, Path>, sight: Sight) -> u32 {
     return select(sight.glances, path.glances - 1u, is_glance(path));
 }
 
 // Every glance has random numbers of its own.
-fn vertex_seed(path: Path) -> u32 {
+fn vertex_seed(path: ptr<function, Path>) -> u32 {
     return params.seed ^ select(0u, path.glances * GLANCE_STREAM, GLANCE_CHAINS);
 }
 
 // What the path does if it meets glass now. At the vertex that the mark names one half of the glances is reflected: the black or the
 // white fields of a chess board, by a coin tossed for each sample.
-fn way_at_glass(path: Path, pixel: Pixel, s: u32, sight: Sight) -> u32 {
+fn way_at_glass(path: ptr<function, Path>, pixel: Pixel, s: u32, sight: Sight) -> u32 {
     let coin = hash_pixel(pixel.key, s, params.seed ^ COIN_STREAM).x;
     let field = (path.glances ^ ((path.glances - 1u) >> (sight.across >> 1u)) ^ coin) & 1u;
-    return select(BY_CHANCE, field, GLANCE_CHAINS && is_glance(path) && path.depth == sight.branch);
+    return select(BY_CHANCE, field, GLANCE_CHAINS & is_glance(path) & (path.depth == sight.branch));
 }

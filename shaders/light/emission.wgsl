@@ -1,17 +1,11 @@
 // Lights that a path meets by chance.
 
-// The light that is kept, by the number of scatterings on its way to the eye.
-fn keeps(scatterings: u32) -> bool {
-    return ALL_LIGHT || (KEEP_EMITTED && scatterings == 0u) || (KEEP_DIRECT && scatterings == 1u)
-        || (KEEP_INDIRECT && scatterings >= 2u);
-}
-
 // What a light that the path meets by chance adds, before the path's weight.
-fn emission(path: Path, hit: Hit) -> vec3f {
+fn emission(path: ptr<function, Path>, hit: Hit) -> vec3f {
     let index = hit.key >> 2u;
     let light = light_at(index);
     let front = dot(path.ray.d, light.normal) < 0.0;
-    let counts = front && keeps(path.depth - 1u) && counts_light(path.trail, index);
+    let counts = front & keeps(path.depth - 1u) & counts_light(path.trail, index);
     let weight = chance_weight(path, light, index) * light_scale(path.ray.medium);
     return light.radiance * select(0.0, weight, counts);
 }

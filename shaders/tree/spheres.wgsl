@@ -23,7 +23,7 @@ fn $walk_visit(ray: Ray, slabs: Slabs, at: Place, hit: ptr<function, Hit>) -> Pl
     let high_0 = bitcast<vec3f>(vec3u(a.w, b.xy));
     let low_1 = bitcast<vec3f>(vec3u(b.zw, c.x));
     let high_1 = bitcast<vec3f>(c.yzw);
-    let solids = textureLoad(records, place + vec2u(3u, 0u));
+    $load_solids
     let leaf_0 = b.y == LEAF;
     if leaf_0 {
         let item = b.x;

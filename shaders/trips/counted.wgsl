@@ -8,7 +8,7 @@ var<private> out_of_trips: bool = false;
 // Counts when the last sample ended: those of an unfinished sample do not count.
 var<private> kept_counts: vec4u;
 
-fn begin_trips(film: PixelFilm) {
+fn begin_trips(film: ptr<function, PixelFilm>) {
     trips_left = params.trips - min(params.trips, TRIPS_AT_START + TRIPS_AT_VERTEX);
     kept_counts = film.counts;
 }
@@ -34,21 +34,20 @@ fn spend_trips(film: ptr<function, PixelFilm>, lives: bool) -> bool {
     return lives || out_of_trips;
 }
 
-fn keep_counts(film: PixelFilm, ended: bool) {
+fn keep_counts(film: ptr<function, PixelFilm>, ended: bool) {
     kept_counts = select(kept_counts, film.counts, ended);
 }
 
 // Without a loop, which may not go round any more.
-fn store_pixel(pixel: Pixel, film: PixelFilm) {
+fn store_pixel(pixel: Pixel, film: ptr<function, PixelFilm>) {
     work.words[pixel.index] = film.s;
-    var stored = film;
     if film.s < film.end {
-        stored.counts = kept_counts;
+        film.counts = kept_counts;
         atomicAdd(&work.unfinished, 1u);
         atomicMax(&work.stuck, select(0u, pixel.index + 1u, film.s == film.first));
     }
-    store_replicate(pixel, stored, 0u);
-    store_replicate(pixel, stored, 1u);
-    store_replicate(pixel, stored, 2u);
-    store_replicate(pixel, stored, 3u);
+    store_replicate(pixel, film, 0u);
+    store_replicate(pixel, film, 1u);
+    store_replicate(pixel, film, 2u);
+    store_replicate(pixel, film, 3u);
 }

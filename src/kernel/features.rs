@@ -286,16 +286,8 @@ impl Features {
     /// The constants of one scene.
     pub fn scene_constants(&self, world: &World, settings: &Settings) -> String {
         let mut s = camera_constants(&world.camera, settings.size);
-        let parts = settings.light;
-        for (name, value) in [
-            ("ALL_LIGHT", parts == LightParts::ALL),
-            ("KEEP_EMITTED", parts.emitted),
-            ("KEEP_DIRECT", parts.direct),
-            ("KEEP_INDIRECT", parts.indirect),
-            ("WHITTED", settings.integrator == Integrator::Whitted),
-        ] {
-            constant(&mut s, name, "bool", value.to_string());
-        }
+        let whitted = settings.integrator == Integrator::Whitted;
+        constant(&mut s, "WHITTED", "bool", whitted.to_string());
         for (name, value) in [
             ("LIGHT_KEYS", 4 * world.lights.len() as u32),
             ("LIGHT_COUNT", world.lights.len() as u32),

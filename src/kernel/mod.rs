@@ -82,6 +82,7 @@ fn scene_text(world: &World, settings: &Settings, features: &Features) -> String
     s.push_str(&emit::materials::dispatch(features));
     s.push_str(&emit::surfaces::generate(world, features, parted.as_ref()));
     s.push_str(&emit::lights::scale(world));
+    s.push_str(&emit::lights::keeps(settings.light));
     if features.light_sampling {
         s.push_str(&emit::lights::choose(world, features));
     }

@@ -167,6 +167,9 @@ fn shadow_function(world: &World, group: &Group) -> Function {
     }
 }
 
+/// The record of a node that says which solids its spheres bound, and within which; where they bound none it is not read.
+const LOAD_SOLIDS: &str = "let solids = textureLoad(records, place + vec2u(3u, 0u));";
+
 /// One walk, which asks `function` at the leaves: for the nearest hit, or until `any` is found.
 fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
     let template: Module = match group.function.shape {
@@ -207,6 +210,7 @@ fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
             ("nodes", &format!("{}u", group.header / 4 + 1)),
             ("goes_on", if any { "hit.key == NONE &&" } else { "" }),
             ("keep", if any { "keep_blocker" } else { "keep_nearest" }),
+            ("load_solids", if group.solids() { LOAD_SOLIDS } else { "" }),
             ("call_0", &calls[0]),
             ("call_1", &calls[1]),
             ("call", &call),

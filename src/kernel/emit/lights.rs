@@ -3,6 +3,7 @@
 use super::super::features::{Features, LightChoice};
 use super::super::layout::DiskLight;
 use super::super::literal::float;
+use crate::settings::LightParts;
 use crate::world::World;
 use std::fmt::Write as _;
 
@@ -66,6 +67,22 @@ pub(in crate::kernel) fn choose(world: &World, features: &Features) -> String {
 "
         }
     }
+}
+
+/// `keeps`: whether light is kept that was scattered so many times on its way to the eye.
+pub(in crate::kernel) fn keeps(parts: LightParts) -> String {
+    let kept = [
+        (parts.emitted, "scatterings == 0u"),
+        (parts.direct, "scatterings == 1u"),
+        (parts.indirect, "scatterings >= 2u"),
+    ];
+    let kept: Vec<&str> = kept.iter().filter(|k| k.0).map(|k| k.1).collect();
+    let condition = match kept.len() {
+        0 => "false".to_owned(),
+        3 => "true".to_owned(),
+        _ => kept.join(" || "),
+    };
+    format!("fn keeps(scatterings: u32) -> bool {{\n    return {condition};\n}}\n\n")
 }
 
 /// See [`World::light_scales`]. Media that follow each other with one scale make one line.
