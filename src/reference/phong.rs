@@ -136,7 +136,7 @@ mod tests {
         for n in [0.0, 1.0, 60.0, 1e5] {
             let material = gloss(0.3, 0.6, n);
             let mut rng = Sampler::new(4, 0, 0);
-            let wo = (normal + 0.9 * random_direction(&mut rng)).normalize();
+            let wo = (normal + 0.9 * random_direction([rng.uniform(), rng.uniform()])).normalize();
             for _ in 0..500 {
                 let u = [rng.uniform(), rng.uniform(), rng.uniform()];
                 let Some((wi, weight, pdf)) = material.sample(normal, wo, u) else {
@@ -162,9 +162,12 @@ mod tests {
         for n in [0.0, 1.0, 10.0, 50.0, 1000.0, 1e5] {
             let material = gloss(0.2, 0.7, n);
             for _ in 0..1000 {
-                let wo = (normal + 0.999 * random_direction(&mut rng)).normalize();
+                let wo =
+                    (normal + 0.999 * random_direction([rng.uniform(), rng.uniform()])).normalize();
                 let near = 3.0 / (1.0 + n).sqrt() * rng.uniform();
-                let wi = (reflect(-wo, normal) + near * random_direction(&mut rng)).normalize();
+                let wi = (reflect(-wo, normal)
+                    + near * random_direction([rng.uniform(), rng.uniform()]))
+                .normalize();
                 if normal.dot(wi) <= 0.0 {
                     continue;
                 }

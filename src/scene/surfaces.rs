@@ -1,4 +1,4 @@
-//! The surfaces of shapes and lights, as [`coincidence`](crate::coincidence) compares them.
+//! The surfaces of shapes and lights, as [`coincidence`] compares them.
 
 use super::{Light, Shape};
 use crate::coincidence::{self, Flat, MAY_COINCIDE, Tube};

@@ -1,8 +1,8 @@
 //! Where a ray meets a convex solid, by search and bisection. Only unit tests use it.
 
 use super::Ray;
-use crate::reference::sampler::Sampler;
 use glam::DVec3;
+use std::f64::consts::TAU;
 
 /// Distance from the ray's origin to which its line is searched, in both directions.
 const REACH: f64 = 50.0;
@@ -49,14 +49,15 @@ pub fn assert_same_hit(ray: &Ray, found: Option<f64>, expected: Option<f64>) {
     }
 }
 
-/// A point, uniform in a cube of half width `half`.
-pub fn random_point(rng: &mut Sampler, half: f64) -> DVec3 {
-    let mut coordinate = || half * (2.0 * rng.uniform() - 1.0);
-    DVec3::new(coordinate(), coordinate(), coordinate())
+/// A point of a cube of half width `half`, from three uniform numbers.
+pub fn random_point(u: [f64; 3], half: f64) -> DVec3 {
+    half * (2.0 * DVec3::from_array(u) - 1.0)
 }
 
-/// A direction, uniform on the sphere.
-pub fn random_direction(rng: &mut Sampler) -> DVec3 {
-    let z = 2.0 * rng.uniform() - 1.0;
-    crate::reference::frame::direction_about(DVec3::Y, z, (1.0 - z * z).sqrt(), rng.uniform())
+/// A point of the unit sphere, from two uniform numbers.
+pub fn random_direction(u: [f64; 2]) -> DVec3 {
+    let y = 2.0 * u[0] - 1.0;
+    let (sin, cos) = (TAU * u[1]).sin_cos();
+    let across = (1.0 - y * y).sqrt();
+    DVec3::new(across * cos, y, -across * sin).normalize()
 }

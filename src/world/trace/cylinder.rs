@@ -169,7 +169,11 @@ mod tests {
         let mut rng = Sampler::new(5, 0, 0);
         let mut faces = [[0; 3]; 2];
         for _ in 0..5000 {
-            let r = ray(random_point(&mut rng, 1.5), random_direction(&mut rng), 0);
+            let r = ray(
+                random_point([(); 3].map(|()| rng.uniform()), 1.5),
+                random_direction([rng.uniform(), rng.uniform()]),
+                0,
+            );
             let found = brute_force::span(&r, f);
             let inside = f(r.origin) < 0.0;
             let (met, expected) = if inside {
@@ -241,7 +245,7 @@ mod tests {
         for _ in 0..10_000 {
             let (s, c) = (7.0 * rng.uniform()).sin_cos();
             let normal = DVec3::new(c, 0.0, s);
-            let d = random_direction(&mut rng);
+            let d = random_direction([rng.uniform(), rng.uniform()]);
             let d = if d.dot(normal) > 0.0 { -d } else { d };
             let r = ray(normal + DVec3::Y * 50.0, d, 11);
             let (t, face) = solid.leave(&r);

@@ -87,7 +87,10 @@ mod tests {
         let center = huge.pole - normal * radius;
         let mut rng = Sampler::new(4, 0, 0);
         for _ in 0..2000 {
-            let r = ray(random_point(&mut rng, 3.0), random_direction(&mut rng));
+            let r = ray(
+                random_point([(); 3].map(|()| rng.uniform()), 3.0),
+                random_direction([rng.uniform(), rng.uniform()]),
+            );
             // One ulp of the ordinary form's numbers, 1e5, is 1.5e-11; glancing rays magnify it.
             let close = |a: f64, b: f64| (a - b).abs() < 1e-7 * (1.0 + a.abs());
             if r.origin.distance(center) > radius {

@@ -68,7 +68,10 @@ mod tests {
         let (center, radius) = (DVec3::new(0.3, -0.2, 0.5), 0.8);
         let (mut outside, mut inside) = (0, 0);
         for _ in 0..3000 {
-            let r = ray(random_point(&mut rng, 2.0), random_direction(&mut rng));
+            let r = ray(
+                random_point([(); 3].map(|()| rng.uniform()), 2.0),
+                random_direction([rng.uniform(), rng.uniform()]),
+            );
             let found = brute_force::span(&r, |p| p.distance(center) - radius);
             if r.origin.distance(center) > radius {
                 let expected = found.filter(|s| s[1] > 0.0).map(|s| s[0]);
@@ -88,8 +91,8 @@ mod tests {
         let (center, radius) = (DVec3::new(100.0, 100.0, 100.0), 1.0);
         let mut rng = Sampler::new(2, 0, 0);
         for k in 0..100_000 {
-            let normal = random_direction(&mut rng);
-            let d = random_direction(&mut rng);
+            let normal = random_direction([rng.uniform(), rng.uniform()]);
+            let d = random_direction([rng.uniform(), rng.uniform()]);
             // Every other chord is glancing.
             let d = if k % 2 == 0 {
                 d
@@ -107,9 +110,11 @@ mod tests {
     fn a_unit_sphere_far_away_is_hit_to_one_part_in_ten_million() {
         let mut rng = Sampler::new(3, 0, 0);
         for _ in 0..1000 {
-            let to = random_direction(&mut rng);
+            let to = random_direction([rng.uniform(), rng.uniform()]);
             let center = to * 1e4;
-            let across = to.cross(random_direction(&mut rng)).normalize();
+            let across = to
+                .cross(random_direction([rng.uniform(), rng.uniform()]))
+                .normalize();
             let miss = rng.uniform();
             // Aimed at a point at distance `miss` from the centre, across the line of sight.
             let r = ray(DVec3::ZERO, center + across * miss);
