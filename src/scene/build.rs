@@ -451,7 +451,10 @@ mod tests {
             assert!(text.contains(expected), "{expected}: {text}");
         }
         let empty = Scene::builder().build().unwrap_err().to_string();
-        assert!(empty.starts_with("the scene: is empty"), "{empty}");
+        assert!(
+            empty.starts_with("the scene: is empty; a scene needs"),
+            "{empty}"
+        );
         let twice = room().diffuse("m", [0.5; 3]).build().unwrap_err();
         assert!(twice.to_string().contains("duplicate"), "{twice}");
     }

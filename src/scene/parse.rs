@@ -160,7 +160,7 @@ fn syntax<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeTable<'a>> {
 /// The whole scene; none when anything is wrong, which has been reported.
 fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> {
     if root.is_empty() {
-        let message = "the file is empty; a scene needs [camera], a [[light]], and a \
+        let message = "is empty; a scene needs [camera], a [[light]], and a \
                        [[sphere]], [[plane]], [[disk]] or [[cylinder]]";
         faults.push(None, message.into());
         return None;

@@ -125,7 +125,7 @@ fn missing_keys_and_tables() {
         assert_eq!(
             parse(empty).expect_err("empty"),
             [
-                "s.toml: the file is empty; a scene needs [camera], a [[light]], and a \
+                "s.toml: is empty; a scene needs [camera], a [[light]], and a \
               [[sphere]], [[plane]], [[disk]] or [[cylinder]]"
             ]
         );
