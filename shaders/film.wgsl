@@ -79,8 +79,7 @@ struct PixelFilm {
     mark: u32,
 }
 
-fn load_pixel(pixel: Pixel) -> PixelFilm {
-    var film: PixelFilm;
+fn load_pixel(pixel: Pixel, film: ptr<function, PixelFilm>) {
     var wanted = 0u;
     for (var k = 0u; k < params.opaque_two + MARK_WORDS; k++) {
         let word = work.words[k * params.pixels + pixel.index];
@@ -100,7 +99,6 @@ fn load_pixel(pixel: Pixel) -> PixelFilm {
         film.sum_2 = textureLoad(running_in, pixel.texel, 2, 0);
         film.sum_3 = textureLoad(running_in, pixel.texel, 3, 0);
     }
-    return film;
 }
 
 // Stores the sum of replicate k, and word k of the counts.

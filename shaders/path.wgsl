@@ -1,4 +1,4 @@
-// The path loop. Every invocation takes one pixel through a range of samples, one vertex a turn.
+// The path loop. Every invocation takes one pixel through a range of samples.
 
 struct Path {
     ray: Ray,
@@ -33,43 +33,39 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     if any(pixel.texel >= params.size) {
         return;
     }
-    var film = load_pixel(pixel);
+    var film: PixelFilm;
+    load_pixel(pixel, &film);
     let sight = sight_of(film.mark);
     begin_trips(&film);
     var path: Path;
     begin_path(&path, true, camera_path(pixel, film.s, sight.glances, sight), sight.glances, vec3f(0.0));
-    // The host keeps the turns of this loop below the driver's limit on loop trips, or the kernel counts them.
+    // One vertex of a path a turn. The host keeps the turns below the driver's limit on loop trips, or the kernel counts them.
     while film.s < film.end && trips_remain() {
-        next_turn(&path, pixel, sight, &film);
+        // Meet the next surface.
+        let hit = intersect(path.ray);
+        count_ray(&film, true);
+        let meets_light = hit.key < LIGHT_KEYS;
+
+        // A light ends the path.
+        if meets_light & sees_lights(&path, sight) {
+            path.radiance += path.beta * emission(&path, hit) * share_of_light(&path, sight);
+        }
+
+        // A surface sends it on, or ends it. Some surface there always is, whatever was met: lanes that met none go through the
+        // motions.
+        let meets_surface = !meets_light & (hit.key != NONE) & looks_on(&path, sight);
+        let met = Hit(hit.t, select(0u, hit.key, meets_surface));
+        let lives = spend_trips(&film, scatter_if(meets_surface, &path, met, pixel, sight, &film));
+
+        // Add the sample of a path that has ended and start the next at once: no lane waits for a longer path.
+        let is_sample = !lives & !is_glance(&path);
+        add_sample(&film, path.radiance, is_sample);
+        keep_counts(&film, is_sample);
+        let glances = glances_after(&path, sight);
+        let seen = select(vec3f(0.0), path.radiance, is_glance(&path));
+        begin_path(&path, !lives, camera_path(pixel, film.s, glances, sight), glances, seen);
     }
     store_pixel(pixel, &film);
-}
-
-// One vertex of a path.
-fn trace_vertex(path: ptr<function, Path>, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) {
-    // Meet the next surface.
-    let hit = intersect(path.ray);
-    count_ray(film, true);
-    let meets_light = hit.key < LIGHT_KEYS;
-
-    // A light ends the path.
-    if meets_light & sees_lights(path, sight) {
-        path.radiance += path.beta * emission(path, hit) * share_of_light(path, sight);
-    }
-
-    // A surface sends it on, or ends it.
-    let meets_surface = !meets_light & (hit.key != NONE) & looks_on(path, sight);
-    // Some surface there always is, whatever was met: lanes that met none go through the motions.
-    let met = Hit(hit.t, select(0u, hit.key, meets_surface));
-    let lives = spend_trips(film, scatter_if(meets_surface, path, met, pixel, sight, film));
-
-    // Add the sample of a path that has ended and start the next at once: no lane waits for a longer path.
-    let is_sample = !lives & !is_glance(path);
-    add_sample(film, path.radiance, is_sample);
-    keep_counts(film, is_sample);
-    let glances = glances_after(path, sight);
-    let seen = select(vec3f(0.0), path.radiance, is_glance(path));
-    begin_path(path, !lives, camera_path(pixel, film.s, glances, sight), glances, seen);
 }
 
 // The camera ray of sample s of the pixel, or of a glance of it.

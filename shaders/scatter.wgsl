@@ -24,11 +24,11 @@ fn is_specular(material: Material) -> bool {
 
 // Gathers direct light at `hit` and sends the path on. False if the path ends there, or meets no surface.
 fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) -> bool {
-    let x = interaction(path.ray, hit, way_at_glass(path, pixel, film.s, sight));
+    var x = interaction(path.ray, hit, way_at_glass(path, pixel, film.s, sight));
     let specular = is_specular(x.material);
 
     // Does it end here? The vertex on the light counts too, so nothing can be gathered beyond the last one.
-    let wanted = meets & !(WHITTED & path.only_lights) & (specular | !is_glance(path)) & trail_goes_on(path.trail, x);
+    let wanted = meets & !(WHITTED & path.only_lights) & (specular | !is_glance(path)) & trail_goes_on(path.trail, &x);
     let last = path.depth >= LAST_DEPTH;
     count_truncated(film, COUNT_TRUNCATED & last & wanted);
     let goes_on = wanted & !last;
@@ -36,16 +36,16 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
     // Direct light, where the surface scatters into more than one direction.
     let key = vec4u(pixel.key, film.s, path.depth, vertex_seed(path));
     let u = draw_vertex(key, path.all_specular, is_phong(x.material));
-    let receiver = receiver_at(x);
-    let direct = direct_light_if(goes_on & !specular, x, receiver, key, u, path.depth, film);
+    let receiver = receiver_at(&x);
+    let direct = direct_light_if(goes_on & !specular, &x, receiver, key, u, path.depth, film);
     // Not even zero is added where nothing is asked: beta may have left f32.
     let gathered = path.beta * (direct.radiance * light_scale(x.medium));
     path.radiance += select(vec3f(0.0), gathered, goes_on & !specular);
     path.only_lights = path.only_lights | (WHITTED & !specular);
 
     // A new direction.
-    var scattered = sample_bsdf(x, u);
-    let astray = follow_images(path, x, direct.weights, u, &scattered);
+    var scattered = sample_bsdf(&x, u);
+    let astray = follow_images(path, &x, direct.weights, u, &scattered);
     path.ray = Ray(x.p, scattered.wi, x.face, scattered.medium, NO_FACE);
     path.specular = scattered.specular;
     path.pdf = scattered.pdf;

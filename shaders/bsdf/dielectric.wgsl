@@ -28,7 +28,7 @@ fn refracted(d: vec3f, n: vec3f, cos_i: f32, cos_t: f32, eta: f32) -> vec3f {
 
 // Chance takes reflection or refraction in proportion to their light. Where a glance is told which way to go it weighs as many times
 // more as half of the glances are fewer than all: what glass reflects is a twentieth of what comes, and left to chance it is noise.
-fn sample_dielectric(x: Interaction, u: Draws) -> Scattered {
+fn sample_dielectric(x: ptr<function, Interaction>, u: Draws) -> Scattered {
     // The index inside over the index outside.
     let ior = x.material.exponent;
     let eta = select(1.0 / ior, ior, x.outside);

@@ -10,12 +10,12 @@ fn diffuse_pdf(cos: f32) -> f32 {
     return select(0.0, fmax(cos, 0.0) * INV_PI, MIS_DIFFUSE);
 }
 
-fn sample_diffuse(x: Interaction, u: Draws) -> Scattered {
+fn sample_diffuse(x: ptr<function, Interaction>, u: Draws) -> Scattered {
     let wi = sample_cosine(x.n, u.direction);
     return Scattered(wi, x.material.color, diffuse_pdf(dot(x.n, wi)), false, x.medium);
 }
 
-fn evaluate_diffuse(x: Interaction, wi: vec3f) -> BsdfValue {
+fn evaluate_diffuse(x: ptr<function, Interaction>, wi: vec3f) -> BsdfValue {
     let cos = dot(x.n, wi);
     return BsdfValue(x.material.color * (INV_PI * cos), diffuse_pdf(cos));
 }

@@ -78,13 +78,13 @@ fn sample_lobes(kd: vec3f, ks: vec3f, exponent: f32, n: vec3f, r: vec3f, choice:
     return PhongSample(d, select(vec3f(0.0), select(quotient, pure, probability >= 1.0), cos > 0.0), value.pdf);
 }
 
-fn sample_phong(x: Interaction, u: Draws) -> Scattered {
+fn sample_phong(x: ptr<function, Interaction>, u: Draws) -> Scattered {
     let m = x.material;
     let s = sample_lobes(m.color, m.specular, m.exponent, x.n, mirrored(-x.wo, x.n), u.lobe, u.direction);
     return Scattered(s.d, s.weight, s.pdf, false, x.medium);
 }
 
-fn evaluate_phong(x: Interaction, wi: vec3f) -> BsdfValue {
+fn evaluate_phong(x: ptr<function, Interaction>, wi: vec3f) -> BsdfValue {
     let m = x.material;
     let power = phong_power(wi, mirrored(-x.wo, x.n), m.exponent);
     let value = phong_value(m.color, m.specular, m.exponent, dot(x.n, wi), power);

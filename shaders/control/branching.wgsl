@@ -9,7 +9,7 @@ fn scatter_if(meets: bool, path: ptr<function, Path>, hit: Hit, pixel: Pixel, si
     return lives;
 }
 
-fn direct_light_if(asks: bool, x: Interaction, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
+fn direct_light_if(asks: bool, x: ptr<function, Interaction>, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     var direct: DirectLight;
     if asks {
         direct = direct_light(true, x, to, key, u, depth, film);

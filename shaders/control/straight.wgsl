@@ -5,6 +5,6 @@ fn scatter_if(meets: bool, path: ptr<function, Path>, hit: Hit, pixel: Pixel, si
     return scatter(path, meets, hit, pixel, sight, film);
 }
 
-fn direct_light_if(asks: bool, x: Interaction, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
+fn direct_light_if(asks: bool, x: ptr<function, Interaction>, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     return direct_light(asks, x, to, key, u, depth, film);
 }

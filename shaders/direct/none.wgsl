@@ -5,7 +5,7 @@ struct DirectLight {
     weights: f32,
 }
 
-fn direct_light(asks: bool, x: Interaction, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
+fn direct_light(asks: bool, x: ptr<function, Interaction>, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     return DirectLight(vec3f(0.0), 0.0);
 }
 

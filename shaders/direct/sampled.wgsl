@@ -20,7 +20,7 @@ fn power_heuristic(inverse: f32, b: f32) -> f32 {
 }
 
 // One light sample of SHADOW_RAYS; if `asks` is false it may be wrong, but costs no ray.
-fn light_sample(asks: bool, x: Interaction, to: Receiver, u: LightDraws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
+fn light_sample(asks: bool, x: ptr<function, Interaction>, to: Receiver, u: LightDraws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     let chosen = choose_light(x.p, to, u.which);
     let wi = sample_light(chosen.light, chosen.cap, to, u.point, u.lobe);
     // 1 / density of this sample among all.

@@ -1,6 +1,6 @@
 // SHADOW_RAYS shadow rays at each vertex, whose choices of lights are stratified.
 
-fn direct_light(asks: bool, x: Interaction, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
+fn direct_light(asks: bool, x: ptr<function, Interaction>, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     var direct = DirectLight(vec3f(0.0), 0.0);
     for (var k = 0u; k < u32(SHADOW_RAYS); k++) {
         // The first one has the numbers of the vertex.

@@ -1,6 +1,7 @@
 // The part of the path loop that seeks lights in mirror balls: see mirror_ball.wgsl.
 
-// Turns of the path loop for one in which paths are sent. 8 and 12 were as fast, 2, 4, 6 and 16 slower.
+// Turns of the path loop for one in which paths are sent: few are, and a software adapter goes through a conditional statement for all
+// lanes as soon as one needs it. src/kernel/images.rs puts the loop over these turns around the vertex of path.wgsl. 8 and 12 were as fast, 2, 4, 6 and 16 slower.
 const TURNS: u32 = 8u;
 
 // What a path remembers of its way; whether it is to be sent to an image, where the ray's direction holds two random numbers and the
@@ -21,12 +22,12 @@ fn is_sent(trail: ImageTrail) -> bool {
 }
 
 // A path that is sent has nothing to do at anything but mirrors.
-fn trail_goes_on(trail: ImageTrail, x: Interaction) -> bool {
+fn trail_goes_on(trail: ImageTrail, x: ptr<function, Interaction>) -> bool {
     return !is_sent(trail) || is_mirror(x.material);
 }
 
 // Sends some paths from diffuse surfaces to an image, and follows them by way of its mirror. True if the path went astray.
-fn follow_images(path: ptr<function, Path>, x: Interaction, light_weights: f32, u: Draws, s: ptr<function, Scattered>) -> bool {
+fn follow_images(path: ptr<function, Path>, x: ptr<function, Interaction>, light_weights: f32, u: Draws, s: ptr<function, Scattered>) -> bool {
     let diffuse = is_diffuse(x.material);
     let mirror = is_mirror(x.material);
     let image = choose_image(x.p, x.n, light_weights, u.lobe);
@@ -50,15 +51,4 @@ fn send(path: ptr<function, Path>) {
     path.beta *= weight;
     path.ray.d = select(path.trail.normal, image.d, weight > 0.0);
     path.trail.sends = false;
-}
-
-// Some vertices, then all paths of the workgroup that are to be sent: few are, and a software adapter goes through a conditional
-// statement for all lanes as soon as one needs it.
-fn next_turn(path: ptr<function, Path>, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) {
-    for (var turn = 0u; turn < TURNS && film.s < film.end && !path.trail.sends; turn++) {
-        trace_vertex(path, pixel, sight, film);
-    }
-    if path.trail.sends {
-        send(path);
-    }
 }

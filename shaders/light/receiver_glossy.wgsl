@@ -11,7 +11,7 @@ struct Receiver {
     narrow: f32,
 }
 
-fn receiver_at(x: Interaction) -> Receiver {
+fn receiver_at(x: ptr<function, Interaction>) -> Receiver {
     let m = x.material;
     let phong = is_phong(m);
     let shares = vec2f(dot(m.color, LIGHT_COLORS), dot(m.specular, LIGHT_COLORS));

@@ -5,7 +5,7 @@ struct Receiver {
     n: vec3f,
 }
 
-fn receiver_at(x: Interaction) -> Receiver {
+fn receiver_at(x: ptr<function, Interaction>) -> Receiver {
     return Receiver(x.n);
 }
 

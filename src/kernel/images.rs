@@ -119,6 +119,25 @@ fn image(
     })
 }
 
+/// The path loop with another around its vertex: after some turns all paths that are to be sent to an image are sent at once.
+///
+/// # Panics
+/// If `wgsl` has no such loop.
+pub(super) fn in_turns(wgsl: &str) -> String {
+    const HEAD: &str = "    while film.s < film.end && trips_remain() {\n";
+    const FOOT: &str = "\n    }\n    store_pixel(";
+    let (before, rest) = wgsl.split_once(HEAD).expect("the path loop");
+    let (vertex, after) = rest.split_once(FOOT).expect("its end");
+    format!(
+        "{before}{HEAD}    for (var turn = 0u; turn < TURNS && film.s < film.end && !path.trail.sends; turn++) {{
+{vertex}
+    }}
+    if path.trail.sends {{
+        send(&path);
+    }}{FOOT}{after}"
+    )
+}
+
 /// `counts_light`, `choose_image`, and the functions that fetch what belongs to an image.
 pub(super) fn generate(world: &World, images: &[Image]) -> String {
     let number = |i: &Image| world.lights.len() + i.mirror;

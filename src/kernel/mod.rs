@@ -50,6 +50,7 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     wgsl.push_str(&scene_text(world, settings, &features));
     if features.images {
         let images = images::of(world, settings, access);
+        wgsl = images::in_turns(&wgsl);
         wgsl.push_str(&images::generate(world, &images));
     }
     Kernel {

@@ -63,11 +63,11 @@ fn a_tile_that_no_texture_holds_is_an_error() {
 
 #[test]
 fn samples_that_are_not_finite_are_left_out_and_counted_by_replicate() {
-    let add = "add_sample(film, path.radiance, is_sample);";
+    let add = "add_sample(&film, path.radiance, is_sample);";
     // One in every replicate's first round but the last's: samples 1, 5 and 9, and the same 256 later.
     let faulty = "var l = path.radiance;
         if film.s % 4u == 1u && film.s % 256u < 12u { l.y = bitcast<f32>(0x7f800000u | (film.s >> 31u)); }
-        add_sample(film, l, is_sample);";
+        add_sample(&film, l, is_sample);";
     let (mut engine, mut film, rect) = engine_with(|wgsl| {
         assert!(wgsl.contains(add));
         wgsl.replace(add, faulty)

@@ -12,7 +12,7 @@ pub(in crate::kernel) fn dispatch(features: &Features) -> String {
     s.push_str(&over(
         features,
         "sample",
-        "fn sample_bsdf(x: Interaction, u: Draws) -> Scattered",
+        "fn sample_bsdf(x: ptr<function, Interaction>, u: Draws) -> Scattered",
         "(x, u)",
         "Scattered",
         &all,
@@ -22,7 +22,7 @@ pub(in crate::kernel) fn dispatch(features: &Features) -> String {
         s.push_str(&over(
             features,
             "evaluate",
-            "fn evaluate_bsdf(x: Interaction, wi: vec3f) -> BsdfValue",
+            "fn evaluate_bsdf(x: ptr<function, Interaction>, wi: vec3f) -> BsdfValue",
             "(x, wi)",
             "BsdfValue",
             &scattering,
