@@ -37,7 +37,7 @@ fn share_of_light(path: ptr<function, Path>, sight: Sight) -> f32 {
     return select(1.0, 1.0 / f32(sight.across * sight.across), is_glance(path));
 }
 
-// Whether the path goes on from a surface that it meets now.
+// Whether the path continues from a surface that it meets now.
 fn looks_on(path: ptr<function, Path>, sight: Sight) -> bool {
     return !is_glance(path) | (GLANCE_CHAINS & (path.depth < sight.depth));
 }

@@ -1,7 +1,8 @@
 // The part of the path loop that seeks lights in mirror balls: see mirror_ball.wgsl.
 
 // Turns of the path loop for one in which paths are sent: few are, and a software adapter goes through a conditional statement for all
-// lanes as soon as one needs it. src/kernel/images.rs puts the loop over these turns around the vertex of path.wgsl. 8 and 12 were as fast, 2, 4, 6 and 16 slower.
+// lanes as soon as one needs it. src/kernel/images.rs puts the loop over these turns around the vertex of path.wgsl. 8 and 12 were
+// as fast, 2, 4, 6 and 16 slower.
 const TURNS: u32 = 8u;
 
 // What a path remembers of its way; whether it is to be sent to an image, where the ray's direction holds two random numbers and the

@@ -1,7 +1,7 @@
 //! Dispatches: samples are cut into submissions by measured cost, which touches no bit of the picture.
 
 use super::glances::GlanceMarks;
-use super::held::{Held, count_row, goes_on};
+use super::held::{Held, continues_block, count_row};
 use super::pack::pack;
 use super::tile::{self, Tile};
 use super::work::{Work, coprime_stride, workgroups};
@@ -227,7 +227,7 @@ impl GpuEngine {
         &self.kernel
     }
 
-    /// Goes on with another seed: no part of the kernel depends on it.
+    /// Sets another seed. No part of the kernel depends on it.
     pub fn reseed(&mut self, seed: u32) {
         self.seed = seed;
     }
@@ -293,7 +293,7 @@ impl GpuEngine {
         // Every dispatch reads one texture and writes the other.
         let mut from = 1 - place;
         while self.counts_trips() {
-            let [unfinished, stuck] = self.tile.as_ref().ok_or("no tile")?.left(&self.gpu)?;
+            let [unfinished, stuck] = self.tile.as_ref().ok_or("no tile")?.unfinished(&self.gpu)?;
             if unfinished == 0 && from == 1 - place {
                 break;
             }
@@ -312,7 +312,7 @@ impl GpuEngine {
         Ok(())
     }
 
-    /// One dispatch, and waits for it: each pixel goes on where the last one of it ended.
+    /// Makes one dispatch and waits for it. Each pixel continues where its last dispatch ended.
     fn dispatch(
         &self,
         rect: Rect,
@@ -342,7 +342,7 @@ impl GpuEngine {
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        tile.clear_left(&mut encoder);
+        tile.clear_unfinished(&mut encoder);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.pipeline);
@@ -421,7 +421,7 @@ impl GpuEngine {
         tile.upload_ranges(&self.gpu, &work.ranges());
         let mut place = 0;
         let held = self.held.take();
-        if parts.iter().any(goes_on) {
+        if parts.iter().any(continues_block) {
             match &held {
                 Some(held) if held.serves(film, rect, parts) => place = held.place,
                 _ => {

@@ -1,4 +1,4 @@
-//! What a call has left in a tile's textures and counters, as it was read back.
+//! What a call leaves in a tile's textures and counters, as it was read back.
 
 use crate::engine::{Counters, Part};
 use crate::film::coverage::Rect;
@@ -14,8 +14,7 @@ pub(super) struct Held {
 }
 
 impl Held {
-    /// Whether the parts that go on with a block go on from just these sums: they need not be put into the textures again
-    /// then.
+    /// Whether the parts that continue a block continue from exactly these sums, so that the textures need not be filled again.
     pub fn serves(&self, film: &Film, tile: Rect, parts: &[Part]) -> bool {
         let same = |rect: Rect, y: u32| {
             let width = rect.width() as usize;
@@ -29,18 +28,18 @@ impl Held {
             && !film.partial().is_empty()
             && parts
                 .iter()
-                .filter(|p| goes_on(p))
+                .filter(|p| continues_block(p))
                 .all(|p| (p.rect.y0..p.rect.y1).all(|y| same(p.rect, y)))
     }
 }
 
-/// Whether a part goes on with a block that is begun.
-pub(super) fn goes_on(part: &Part) -> bool {
+/// Whether a part continues a block that already has samples.
+pub(super) fn continues_block(part: &Part) -> bool {
     !part.samples.start.is_multiple_of(BLOCK)
 }
 
-/// What the counters of some pixels say, as `shaders/path.wgsl` packs them for a block that begins with sample number `block`:
-/// all of it together, and which pixels have lost samples of which replicates.
+/// Unpacks the counters of some pixels, as `PixelFilm` of `shaders/film.wgsl` holds them, for a block that begins with sample number
+/// `block`. Returns their totals, and for each pixel that lost samples how many each replicate lost.
 pub(super) fn count_row(
     pixels: impl Iterator<Item = (u32, u32, [u32; 4])>,
     block: u64,

@@ -13,7 +13,7 @@ pub enum Packed {
     Baked,
     /// Arrays for storage buffers.
     Buffers(Buffers),
-    /// One row of the texture of records, or whole ones, as fetch/records.wgsl and tree/walk.wgsl say.
+    /// One row of the texture of records, or whole ones, as `shaders/fetch/records.wgsl` and `shaders/tree/walk.wgsl` say.
     Records(Vec<[u32; 4]>),
 }
 
@@ -52,7 +52,7 @@ impl Buffers {
     }
 }
 
-/// Appends the trees of [`Access::Tree`], one after the other, as tree.wgsl says.
+/// Appends the trees of [`Access::Tree`], one after the other, as `shaders/tree/walk.wgsl` says.
 fn pack_trees(
     records: &mut Vec<[u32; 4]>,
     world: &World,
@@ -111,7 +111,7 @@ fn pack_trees(
     }
 }
 
-/// The light clusters of a world, and which lights are where, as light_tree.wgsl says.
+/// The light clusters of a world, and which lights are where, as `shaders/light/choose_by_tree.wgsl` says.
 fn pack_lights(world: &World) -> Vec<[u32; 4]> {
     let tree = LightTree::new(world);
     let clusters: Vec<LightCluster> = tree

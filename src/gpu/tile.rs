@@ -15,20 +15,20 @@ pub(super) struct Tile {
     /// Bind group k reads texture k.
     pub bind_groups: [wgpu::BindGroup; 2],
     counters: wgpu::Buffer,
-    /// What is left to do, as `Left` in `shaders/path.wgsl` says.
-    left: wgpu::Buffer,
+    /// The work to do, as `Work` of `shaders/film.wgsl` says.
+    work: wgpu::Buffer,
     staging: wgpu::Buffer,
 }
 
-/// Bytes of the two numbers that say what is left.
-const LEFT_HEAD: u64 = 8;
+/// Bytes of the two counts at the head of `Work`.
+const WORK_HEAD: u64 = 8;
 
 fn row_bytes(width: u32) -> u32 {
     (width * TEXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }
 
-/// llvmpipe compiles a kernel anew for textures whose width or height is a power of two, as if it sampled them:
-/// with none, the compilation at start-up serves every tile.
+/// llvmpipe compiles a kernel again for textures whose width or height is a power of two, as if it sampled them. With no such
+/// textures the compilation at start-up serves every tile.
 fn not_a_power_of_two(n: u32) -> u32 {
     if n.is_power_of_two() {
         n + 1 + u32::from(n == 1)
@@ -72,9 +72,9 @@ impl Tile {
         });
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let numbers = if marks_seen { 3 } else { 2 } * pixels;
-        let left = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("left"),
-            size: LEFT_HEAD + 4 * numbers,
+        let work = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("work"),
+            size: WORK_HEAD + 4 * numbers,
             usage: wgpu::BufferUsages::STORAGE
                 | wgpu::BufferUsages::COPY_SRC
                 | wgpu::BufferUsages::COPY_DST,
@@ -115,7 +115,7 @@ impl Tile {
                     },
                     wgpu::BindGroupEntry {
                         binding: 4,
-                        resource: left.as_entire_binding(),
+                        resource: work.as_entire_binding(),
                     },
                 ],
             })
@@ -126,47 +126,46 @@ impl Tile {
             textures,
             bind_groups,
             counters,
-            left,
+            work,
             staging,
         }
     }
 
-    /// Says which samples each pixel is to have: see [`Work::ranges`](super::work::Work::ranges).
+    /// Uploads which samples each pixel is to get: see [`Work::ranges`](super::work::Work::ranges).
     pub fn upload_ranges(&self, gpu: &Gpu, ranges: &[u32]) {
         gpu.queue
-            .write_buffer(&self.left, LEFT_HEAD, bytemuck::cast_slice(ranges));
+            .write_buffer(&self.work, WORK_HEAD, bytemuck::cast_slice(ranges));
     }
 
     /// Says up to which vertex glances look for lights, in rows of the tile.
     pub fn upload_seen(&self, gpu: &Gpu, seen: &[u32]) {
-        let at = LEFT_HEAD + 2 * 4 * seen.len() as u64;
+        let at = WORK_HEAD + 2 * 4 * seen.len() as u64;
         gpu.queue
-            .write_buffer(&self.left, at, bytemuck::cast_slice(seen));
+            .write_buffer(&self.work, at, bytemuck::cast_slice(seen));
     }
 
-    /// No pixel is unfinished, before a dispatch.
-    pub fn clear_left(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.clear_buffer(&self.left, 0, Some(LEFT_HEAD));
+    /// Before a dispatch no pixel is unfinished.
+    pub fn clear_unfinished(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.clear_buffer(&self.work, 0, Some(WORK_HEAD));
     }
 
-    /// Of how many pixels the last dispatch could not do its samples, and 1 + the number of one of which not even one could be
-    /// finished.
-    pub fn left(&self, gpu: &Gpu) -> Result<[u32; 2], String> {
+    /// In how many pixels the last dispatch ran out of loop trips, and 1 + the number of one in which it finished no sample at all.
+    pub fn unfinished(&self, gpu: &Gpu) -> Result<[u32; 2], String> {
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&self.left, 0, &self.staging, 0, LEFT_HEAD);
+        encoder.copy_buffer_to_buffer(&self.work, 0, &self.staging, 0, WORK_HEAD);
         gpu.queue.submit([encoder.finish()]);
-        let head = self.staging.slice(..LEFT_HEAD);
+        let head = self.staging.slice(..WORK_HEAD);
         head.map_async(wgpu::MapMode::Read, |_| {});
         gpu.wait()?;
         let mapped = head
             .get_mapped_range()
             .map_err(|e| format!("reading back failed: {e}"))?;
-        let left = bytemuck::pod_read_unaligned(&mapped);
+        let counts = bytemuck::pod_read_unaligned(&mapped);
         drop(mapped);
         self.staging.unmap();
-        Ok(left)
+        Ok(counts)
     }
 
     /// Counters to zero.
@@ -174,7 +173,7 @@ impl Tile {
         encoder.clear_buffer(&self.counters, 0, None);
     }
 
-    /// Puts running sums, rows of the tile, into texture 0.
+    /// Uploads running sums, in rows of the tile, into texture 0.
     pub fn upload(&self, gpu: &Gpu, sums: &[[Sums<f32>; REPLICATES]]) {
         for r in 0..REPLICATES {
             let layer: Vec<Sums<f32>> = sums.iter().map(|s| s[r]).collect();
@@ -201,7 +200,7 @@ impl Tile {
     }
 
     /// Reads the sums in texture number `place` into `running`, rows of pixels, and returns the counters of each pixel, as
-    /// `shaders/path.wgsl` packs them.
+    /// `PixelFilm` of `shaders/film.wgsl` holds them.
     pub fn download(
         &self,
         gpu: &Gpu,

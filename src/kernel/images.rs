@@ -1,4 +1,4 @@
-//! Which lights are sought in which mirror balls, and generated WGSL that chooses among them: see shaders/image.wgsl.
+//! Which lights are sought in which mirror balls, and generated WGSL that chooses among them: see `shaders/image/mirror_ball.wgsl`.
 
 use super::access::Access;
 use super::emit::fetch::{Scalars, chain};

@@ -59,7 +59,7 @@ fn edges_of_a_shadow(b: &Backend) -> Result<Vec<Measure>, Trouble> {
             .add(sphere(v(0.0, 1.0, 0.0), 0.5), grey(0.0))
             .light(v(0.0, 3.0, 0.0), -DVec3::Y, 0.2, 10.0)
     };
-    // Where the line from the light's rim at `from` touches the ball and goes on to the floor.
+    // Where the line from the light's rim at `from` touches the ball and continues to the floor.
     let edge = |from: f64| {
         let misses = |x: f64| {
             let (line, to_ball) = (v(x - from, -3.0, 0.0), v(-from, -2.0, 0.0));

@@ -108,7 +108,7 @@ pub fn ray(origin: DVec3, direction: DVec3) -> Ray {
     }
 }
 
-/// The ray that goes on from a hit.
+/// The ray that continues from a hit.
 pub fn from_hit(hit: &Hit, direction: DVec3, medium: u32) -> Ray {
     Ray {
         origin: hit.point,
