@@ -1,4 +1,4 @@
-// A path's meeting with a surface, and what its material makes of it: the words that every material speaks.
+// What every material takes and returns: where a path meets a surface, how it continues, and how much light a direction carries.
 
 // What is known where a path meets a surface.
 struct Interaction {

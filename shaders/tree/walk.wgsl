@@ -1,15 +1,19 @@
 // Walking a bounding volume hierarchy without a stack: node k has the children 2k and 2k + 1, and one bit for each level says
 // whether the sibling of the node there is still to be visited. The walk itself is generated for each kind of surface.
 
-// Each node has four records. The first three are twelve words, six for each child. Those of a box are
-//   its least corner, its greatest corner.
-// Of spheres the sixth word is LEAF, and the others are
-//   centre, radius, 2 (number of the surface + 1), + 1 if it can block light;
-// where they bound solids the fourth record has solid and parent of both children. Of other surfaces each has a node of its own,
-// whose twelfth word is LEAF and whose first is that number; of disks
-//   centre, radius; normal, offset; that number, face, 0, LEAF.
-// Before each tree: farthest from the origin that it
-// reaches. Node 0 has two boxes that nothing meets: where a walk goes when it is done.
+// Each node has four records. The first three hold twelve words, six for each child.
+//
+//   a box      least corner, greatest corner
+//   a sphere   centre, radius, item, LEAF
+//
+// An item is 2 (number of the surface + 1), + 1 if the surface can block light. If spheres bound solids, the fourth record holds the
+// solid and its parent of either child. Every other surface has a node of its own:
+//
+//   a disk     centre, radius; normal, offset; item, face, 0, LEAF
+//   the rest   item in the first word, LEAF in the twelfth
+//
+// A header of four records stands before each tree. Its first word is how far the tree reaches from the origin. Node 0 has two boxes
+// that nothing meets: a walk goes there when it is done.
 const LEAF: u32 = 0xffffffffu;
 
 // Farther than anything.
@@ -56,7 +60,7 @@ struct Place {
     siblings: u32,
 }
 
-// Goes on to the nearer child that is met, or else to the last sibling that was put off.
+// The next node: the nearer child that is met, or else the last sibling that was put off.
 fn onward(at: Place, entry_0: f32, entry_1: f32) -> Place {
     let second = entry_1 < entry_0;
     let met = fmin(entry_0, entry_1) < MISSED;

@@ -3,20 +3,22 @@
 use crate::engine::DeviceInfo;
 use crate::world::World;
 
-/// Scenes with more surfaces, lights included, have trees. By paths a second the two are even at about a hundred spheres (on
-/// lavapipe 22.3, of 512-bit vectors: 12 million at 8 spheres against 3.6, 6.0 at 48 against 3.7, 3.5 at 96 against 3.5), and 16
-/// lights over 40 things of every shape and material run 1.3 times as fast when baked; but unrolled code costs its compiler 0.7
-/// s at 48 spheres, 1.0 s instead of 0.7 s there, and twice that at 96, which a picture of few samples does not earn back.
+/// The most surfaces, lights included, that are baked; scenes with more have trees.
+///
+/// In paths per second the two are equal at about a hundred spheres. On lavapipe 22.3 with 512-bit vectors baked kernels and trees
+/// traced 12 and 3.6 million at 8 spheres, 6.0 and 3.7 at 48, 3.5 and 3.5 at 96; 16 lights over 40 surfaces of every shape and
+/// material ran 1.3 times as fast when baked. But unrolled code takes longer to compile: 1.0 s instead of 0.7 s at 48 spheres, and
+/// twice that at 96. A picture of few samples does not earn that back.
 pub const BAKED_LIMIT: usize = 56;
 
 /// Where the surfaces and lights are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Access {
-    /// One line of code a surface, its values in the text.
+    /// One line of code for each surface, with its values in the text.
     Baked,
     /// Loops over storage buffers.
     Buffers,
-    /// Bounding volume hierarchies in storage buffers.
+    /// Bounding volume hierarchies in a storage texture.
     Tree,
 }
 
@@ -30,8 +32,8 @@ impl Access {
         }
     }
 
-    /// The same on a known device. SwiftShader's compiler takes minutes over the long straight code of a dozen baked
-    /// surfaces, and a second over the loops.
+    /// The same for a known device. SwiftShader's compiler takes minutes for the long straight code of a dozen baked surfaces, and
+    /// a second for loops.
     pub fn choose_for(world: &World, device: &DeviceInfo) -> Self {
         match Self::choose(world) {
             Self::Baked if device.name.contains("SwiftShader") => Self::Buffers,
@@ -39,7 +41,7 @@ impl Access {
         }
     }
 
-    /// The word for it in messages.
+    /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Baked => "baked",

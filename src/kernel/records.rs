@@ -1,14 +1,14 @@
-//! Where everything lies in the texture of records that kernels of large scenes read.
+//! The layout of the texture of records that kernels with trees read.
 
 use super::trees::Parted;
 use crate::world::World;
 use crate::world::light_tree::{LIGHTS_A_CLUSTER, ends, serves};
 use std::fmt::Write as _;
 
-/// Records, of four words each, in a row of the texture.
+/// Records of four words in a row of the texture.
 pub(crate) const RECORDS_A_ROW: u32 = 4096;
 
-/// Numbers of the first records of each kind; trees begin at 0.
+/// The number of the first record of each kind. Trees begin at 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Records {
     /// Four for each surface.
@@ -17,8 +17,8 @@ pub(crate) struct Records {
     pub materials: usize,
     /// Three for each light.
     pub lights: usize,
-    /// Two for each light cluster, if lights are chosen by clusters, and as many empty ones: lanes that sit a choice out look
-    /// there, and integers read as subnormal numbers would cost all lanes a hundred cycles a product.
+    /// Two for each light cluster, if lights are chosen by clusters, and as many empty ones. Lanes that take no part in a choice read
+    /// those: other records hold integers, which read as subnormal numbers would cost all lanes a hundred cycles a product.
     pub clusters: usize,
     /// One for each cluster at the end of the tree.
     pub fours: usize,
@@ -29,7 +29,7 @@ pub(crate) struct Records {
 }
 
 impl Records {
-    /// By the numbers of things alone.
+    /// Depends only on the numbers of surfaces, materials and lights.
     pub fn new(world: &World, parted: &Parted) -> Self {
         let lights = world.lights.len();
         let ends = if serves(world.lights.len()) {

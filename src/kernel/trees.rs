@@ -1,7 +1,7 @@
-//! Which surfaces of a large scene lie in trees, and the generated WGSL that walks these.
+//! Which surfaces of a large scene lie in trees, and the WGSL that walks those trees.
 //!
-//! Every kind of surface, as one function of the shaders meets it, has a tree of its own, so that a walk contains just
-//! that function. What has no bounds, and kinds with few members, are met one by one, as in small scenes.
+//! All surfaces that one function of the shaders meets share a tree, so that a walk calls just that function. Surfaces without bounds,
+//! and groups with few members, are met one by one, as in small scenes.
 
 use super::access::BAKED_LIMIT;
 use super::emit::surfaces::{Function, Target, Variant, for_shadows, targets};
@@ -11,9 +11,9 @@ use super::preprocess::fill;
 use crate::world::{Bounds, Tree, World};
 use std::fmt::Write as _;
 
-/// Kinds with at least so many members have a tree, the first of these numbers by which no more than [`BAKED_LIMIT`] surfaces
-/// with bounds are left to be met one by one. A walk takes as long as a test of about ninety spheres, or of thirty
-/// cylinders, and what is met one by one is compiled for longer.
+/// The least members of a group that gets a tree: the first of these numbers that leaves at most [`BAKED_LIMIT`] bounded surfaces to be
+/// met one by one. A walk takes as long as testing about ninety spheres or thirty cylinders, and surfaces that are met one by
+/// one take longer to compile.
 const LEAST_IN_TREE: [usize; 4] = [48, 24, 12, 1];
 
 /// Surfaces that one function meets, and where their tree lies.
@@ -22,7 +22,7 @@ pub(crate) struct Group {
     pub function: Function,
     /// Their numbers, lights first.
     pub numbers: Vec<usize>,
-    /// Number of the record, a multiple of four, four before those of their tree's nodes.
+    /// Number of the tree's first record, a multiple of four. Four records are the header; the nodes follow.
     pub header: usize,
 }
 
@@ -32,7 +32,7 @@ impl Group {
         self.header + 4 * (1 + self.nodes())
     }
 
-    /// How many nodes are there, number 0 among them.
+    /// The number of nodes, node 0 included.
     pub fn nodes(&self) -> usize {
         let all = Tree::numbers(self.numbers.len());
         if self.spheres() {
@@ -58,7 +58,7 @@ impl Group {
     }
 }
 
-/// How a scene's surfaces are parted.
+/// A scene's surfaces, divided into trees and the rest.
 pub(crate) struct Parted {
     /// Those in trees.
     pub groups: Vec<Group>,
@@ -67,8 +67,8 @@ pub(crate) struct Parted {
 }
 
 impl Parted {
-    /// By kinds and their numbers alone. In a small scene, where nobody would want trees, all go into trees that can: so
-    /// tests reach every part.
+    /// Depends only on the functions and how many surfaces each meets. In small scenes, which need no trees, every surface that can
+    /// goes into one, so that tests reach every part.
     pub fn new(world: &World) -> Self {
         let all = targets(world);
         let bounded = |t: &Target| bounds(world, t.number).is_some();
@@ -152,7 +152,7 @@ pub(super) fn walks(world: &World, parted: &Parted, shadows: bool) -> String {
     s
 }
 
-/// The function for shadow rays. Where some of a group hold lights and others do not, what is right for those is right for all.
+/// The function for shadow rays. If some solids of a group hold lights and others do not, the function of the former serves all.
 fn shadow_function(world: &World, group: &Group) -> Function {
     let target = |&number: &usize| Target {
         number,
@@ -167,10 +167,10 @@ fn shadow_function(world: &World, group: &Group) -> Function {
     }
 }
 
-/// The record of a node that says which solids its spheres bound, and within which; where they bound none it is not read.
+/// Loads the record of a node that names the solids its spheres bound, and those around them. Trees of opaque spheres leave it out.
 const LOAD_SOLIDS: &str = "let solids = textureLoad(records, place + vec2u(3u, 0u));";
 
-/// One walk, which asks `function` at the leaves: for the nearest hit, or until `any` is found.
+/// One walk, which calls `function` at the leaves: for the nearest hit, or for `any` hit.
 fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
     let template: Module = match group.function.shape {
         ShapeKind::Sphere => WALK_SPHERES,
@@ -183,7 +183,7 @@ fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
         (true, false) => "*hit",
         (true, true) => "hit",
     };
-    // What a leaf of spheres or disks does not hold is known, or in the record beside it.
+    // Leaves of spheres and disks hold these fields elsewhere, or they follow from the surface's number.
     let leaf = |field: &str, child: usize| match (field, group.disks()) {
         ("faces.x", true) => "c.y".to_owned(),
         ("faces.x", false) => "4u * i + 1u".to_owned(),

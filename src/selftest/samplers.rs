@@ -204,7 +204,7 @@ fn choice(b: &Backend, name: &str, access: Access) -> Result<Measure, Trouble> {
         .light(v(9.0, 3.0, 0.0), DVec3::Y, 0.5, 1.0);
     let body = format!(
         "{CLEAR}
-        let chosen = choose_light(vec3f(x[2], x[3], 0.0), Receiver(vec3f(0.0, 1.0, 0.0)), x[0]);
+        let chosen = choose_light(vec3f(x[2], x[3], 0.0), Receiver(vec3f(0.0, 1.0, 0.0)), vec2f(x[0], 0.0));
         let p = select(0.0, 1.0 / chosen.inverse_probability, chosen.inverse_probability > 0.0);
         y[0] = select(-1.0, p, chosen.index < 4u && p <= 1.000001);
         y[1] = chosen.weights;"
