@@ -1,10 +1,11 @@
 //! What the kernel of a scene needs, decided once from world and settings.
 
 use super::access::Access;
-use super::layout::{MaterialKind, ShapeKind};
+use super::layout::ShapeKind;
 use super::literal::{float, vector};
 use super::{glances, images};
 use crate::film::{BLOCK, REPLICATES};
+use crate::scene::MaterialKind;
 use crate::settings::{Integrator, LightParts, Settings};
 use crate::world::{
     AIR, Geometry, World, WorldCamera, WorldPrimitive, light_tree, near_light, visibility,
@@ -94,7 +95,7 @@ pub(super) struct Features {
     /// Light samples at a vertex.
     pub shadow_rays: u32,
     /// Diffuse bounces that meet a light by chance are weighed against light sampling.
-    mis_diffuse: bool,
+    mis_cosine: bool,
     /// Images of lights in mirror balls are sought.
     pub images: bool,
     /// The last vertex at which glances look for lights; 0: none are sent.
@@ -116,7 +117,7 @@ impl Features {
                 .iter()
                 .map(|p| &world.materials[p.material])
         };
-        let materials: BTreeSet<MaterialKind> = used().map(MaterialKind::of).collect();
+        let materials: BTreeSet<MaterialKind> = used().map(|b| b.kind()).collect();
         let shapes = world.primitives.iter().map(|p| ShapeKind::of(&p.geometry));
         let lit = |p: &WorldPrimitive| {
             let caps = matches!(p.geometry, Geometry::Cylinder { .. }).then_some(&p.faces[1..]);
@@ -124,9 +125,8 @@ impl Features {
             faces.any(|f| world.lights.iter().any(|l| l.face == *f))
         };
         let last_depth = last_depth(settings);
-        let scatters = materials.iter().any(|m| !m.specular());
+        let scatters = materials.iter().any(|m| !m.is_specular());
         let light_sampling = last_depth > 1 && !world.lights.is_empty() && scatters;
-        let diffuse = materials.contains(&MaterialKind::Diffuse);
         let choice = match (world.lights.len(), access) {
             (0 | 1, _) => LightChoice::Only,
             (_, Access::Baked) => LightChoice::Unrolled,
@@ -148,7 +148,7 @@ impl Features {
             hidden_lights: light_sampling && visibility::lights_overlap(world),
             shadow_rays: settings.shadow_rays,
             // What a cosine-distributed bounce finds of a light, cap sampling finds as well, unless it is near.
-            mis_diffuse: light_sampling && diffuse && near_light::light_near_diffuse(world),
+            mis_cosine: light_sampling && near_light::light_near_matt(world),
             images: !images::of(world, settings, access).is_empty(),
             sight: glances::sight(world, settings, access),
             strata: settings.strata,
@@ -170,7 +170,7 @@ impl Features {
             choice: LightChoice::Unrolled,
             hidden_lights: false,
             shadow_rays: 1,
-            mis_diffuse: true,
+            mis_cosine: true,
             images: probe.images,
             sight: 0,
             strata: probe.strata,
@@ -188,6 +188,11 @@ impl Features {
         self.materials.iter().copied()
     }
 
+    /// Whether any material scatters into the whole hemisphere.
+    pub fn scatters(&self) -> bool {
+        self.materials.iter().any(|m| !m.is_specular())
+    }
+
     pub fn has_shape(&self, kind: ShapeKind) -> bool {
         self.shapes.contains(&kind)
     }
@@ -199,7 +204,7 @@ impl Features {
 
     /// Whether light met by chance is weighed against light sampling anywhere.
     fn mis(&self) -> bool {
-        self.glossy() || self.mis_diffuse
+        self.glossy() || self.mis_cosine
     }
 
     /// Whether its lines of the shaders count.
@@ -254,7 +259,7 @@ impl Features {
         for (name, value) in [
             ("GLOSSY", self.glossy()),
             ("MIS", self.mis()),
-            ("MIS_DIFFUSE", self.mis_diffuse),
+            ("MIS_COSINE", self.mis_cosine),
             ("COUNT_TRUNCATED", self.count_truncated),
             ("GLANCE_CHAINS", self.sight > 1),
         ] {

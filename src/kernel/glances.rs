@@ -2,7 +2,6 @@
 
 use super::access::{Access, BAKED_LIMIT};
 use super::trips;
-use crate::scene::Bsdf;
 use crate::settings::Settings;
 use crate::world::{World, WorldLight};
 
@@ -43,7 +42,7 @@ pub(super) fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
         .primitives
         .iter()
         .map(|p| &world.materials[p.material]);
-    let shown = used.any(|b| matches!(b, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. }))
+    let shown = used.any(|b| b.kind().is_specular())
         && !world.lights.is_empty()
         && world.primitives.len() + world.lights.len() <= BAKED_LIMIT;
     let sight = if access == Access::Tree {

@@ -7,43 +7,6 @@ use crate::world::{Geometry, World, WorldLight, WorldPrimitive};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-/// A scattering model. The tag of `Material.kind` is its number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum MaterialKind {
-    Diffuse,
-    Mirror,
-    Dielectric,
-    Phong,
-}
-
-impl MaterialKind {
-    pub const ALL: [Self; 4] = [Self::Diffuse, Self::Mirror, Self::Dielectric, Self::Phong];
-
-    pub fn of(bsdf: &Bsdf) -> Self {
-        match bsdf {
-            Bsdf::Diffuse { .. } => Self::Diffuse,
-            Bsdf::Mirror { .. } => Self::Mirror,
-            Bsdf::Dielectric { .. } => Self::Dielectric,
-            Bsdf::Phong { .. } => Self::Phong,
-        }
-    }
-
-    /// As it stands in the names of the shaders' functions: `sample_NAME`, `evaluate_NAME`, `is_NAME`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Diffuse => "diffuse",
-            Self::Mirror => "mirror",
-            Self::Dielectric => "dielectric",
-            Self::Phong => "phong",
-        }
-    }
-
-    /// Whether it scatters into a few directions alone: there is nothing to evaluate.
-    pub fn specular(self) -> bool {
-        matches!(self, Self::Mirror | Self::Dielectric)
-    }
-}
-
 /// A shape. The tag of `Surface.shape` is its number; flat ones come first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum ShapeKind {
@@ -362,23 +325,19 @@ impl Surface {
 }
 
 impl Material {
+    /// Colours go to `color` and `specular`, and the number to `exponent`, in the order of [`Bsdf::parameters`].
     pub fn of(bsdf: &Bsdf) -> Self {
-        let (color, specular, exponent) = match *bsdf {
-            Bsdf::Diffuse { reflectance } | Bsdf::Mirror { reflectance } => {
-                (reflectance, DVec3::ZERO, 0.0)
-            }
-            Bsdf::Dielectric { ior, transmittance } => (transmittance, DVec3::ZERO, ior),
-            Bsdf::Phong {
-                diffuse,
-                specular,
-                exponent,
-            } => (diffuse, specular, exponent),
-        };
+        let (colors, numbers) = (bsdf.colors(), bsdf.numbers());
+        assert!(
+            colors.len() <= 2 && numbers.len() <= 1,
+            "a material has more parameters than Material has fields"
+        );
+        let color = |i: usize| single(colors.get(i).copied().unwrap_or_default());
         Self {
-            color: single(color),
-            kind: MaterialKind::of(bsdf) as u32,
-            specular: single(specular),
-            exponent: exponent as f32,
+            color: color(0),
+            kind: bsdf.kind() as u32,
+            specular: color(1),
+            exponent: numbers.first().map_or(0.0, |&x| x as f32),
         }
     }
 }

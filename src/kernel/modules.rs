@@ -2,7 +2,8 @@
 
 use super::access::Access;
 use super::features::{Features, LightChoice};
-use super::layout::{MaterialKind, ShapeKind};
+use super::layout::ShapeKind;
+use crate::scene::MaterialKind;
 
 /// A file of `shaders/`.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +47,7 @@ modules! {
     WALK_DISKS = "tree/disks",
     WALK_BOXES = "tree/boxes",
     INTERACTION = "interaction",
+    COSINE = "bsdf/cosine",
     DIFFUSE = "bsdf/diffuse",
     MIRROR = "bsdf/mirror",
     DIELECTRIC = "bsdf/dielectric",
@@ -142,17 +144,11 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
         (MaterialKind::Dielectric, DIELECTRIC),
         (MaterialKind::Phong, PHONG),
     ];
-    // A glossy lobe has a diffuse part.
-    let needed = |kind: MaterialKind| {
-        f.has_material(kind)
-            || (kind == MaterialKind::Diffuse && f.has_material(MaterialKind::Phong))
-    };
-    modules.extend(
-        materials
-            .iter()
-            .filter(|(kind, _)| needed(*kind))
-            .map(|m| m.1),
-    );
+    if f.scatters() {
+        modules.push(COSINE);
+    }
+    let used = materials.iter().filter(|(kind, _)| f.has_material(*kind));
+    modules.extend(used.map(|m| m.1));
     modules.push(DISK_LIGHT);
     modules.push(if glossy {
         RECEIVER_GLOSSY

@@ -5,7 +5,7 @@
 //! different hashes. Scenes that differ never have the same hash. Order in the file counts only among surfaces of one kind
 //! that coincide, since there it decides which one a ray meets.
 
-use crate::scene::{Bsdf, Camera, Canonical, Light, Primitive, Scene, Shape};
+use crate::scene::{Bsdf, Camera, Canonical, Light, Parameter, Primitive, Scene, Shape};
 use crate::settings::{Integrator, LightParts, Settings};
 use glam::DVec3;
 use sha2::{Digest, Sha256};
@@ -142,29 +142,11 @@ impl Hasher {
     }
 
     fn bsdf(&mut self, bsdf: &Bsdf) {
-        match *bsdf {
-            Bsdf::Diffuse { reflectance } => {
-                self.word("diffuse");
-                self.vector(reflectance);
-            }
-            Bsdf::Mirror { reflectance } => {
-                self.word("mirror");
-                self.vector(reflectance);
-            }
-            Bsdf::Dielectric { ior, transmittance } => {
-                self.word("dielectric");
-                self.number(ior);
-                self.vector(transmittance);
-            }
-            Bsdf::Phong {
-                diffuse,
-                specular,
-                exponent,
-            } => {
-                self.word("phong");
-                self.vector(diffuse);
-                self.vector(specular);
-                self.number(exponent);
+        self.word(bsdf.kind().name());
+        for parameter in bsdf.parameters() {
+            match parameter {
+                Parameter::Color(_, color) => self.vector(color),
+                Parameter::Number(_, x) => self.number(x),
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use super::parse::parse_str;
 use super::source::quoted;
-use super::{Bsdf, Camera, Diagnostic, Light, Place, Scene, Shape};
+use super::{Bsdf, Camera, Diagnostic, Light, Parameter, Place, Scene, Shape};
 use glam::DVec3;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -73,28 +73,13 @@ impl SceneBuilder {
 
     /// A material of any kind under a name of its own.
     pub fn material(mut self, name: &str, bsdf: Bsdf) -> Self {
-        let text = match bsdf {
-            Bsdf::Diffuse { reflectance } => {
-                "type = \"diffuse\"\n".to_owned() + &keys(&[("reflectance", reflectance)])
-            }
-            Bsdf::Mirror { reflectance } => {
-                "type = \"mirror\"\n".to_owned() + &keys(&[("reflectance", reflectance)])
-            }
-            Bsdf::Dielectric { ior, transmittance } => {
-                "type = \"dielectric\"\n".to_owned()
-                    + &key("ior", ior)
-                    + &keys(&[("transmittance", transmittance)])
-            }
-            Bsdf::Phong {
-                diffuse,
-                specular,
-                exponent,
-            } => {
-                "type = \"phong\"\n".to_owned()
-                    + &keys(&[("diffuse", diffuse), ("specular", specular)])
-                    + &key("exponent", exponent)
-            }
-        };
+        let mut text = format!("type = {}\n", string(bsdf.kind().name()));
+        for parameter in bsdf.parameters() {
+            text += &match parameter {
+                Parameter::Color(name, color) => keys(&[(name, color)]),
+                Parameter::Number(name, x) => key(name, x),
+            };
+        }
         let table = format!("[material.{}]\n{text}", string(name));
         self.tables
             .push((format!("material {}", quoted(name)), table));

@@ -109,7 +109,7 @@ fn materials(scene: &Scene) -> Warnings {
 }
 
 fn is_dielectric(scene: &Scene, p: &Primitive) -> bool {
-    matches!(scene.materials[p.material].bsdf, Bsdf::Dielectric { .. })
+    scene.materials[p.material].bsdf.is_dielectric()
 }
 
 /// "the sphere at line 12", or "the sphere" for a scene made in memory.

@@ -2,10 +2,10 @@
 //! them to list the keys.
 
 use super::value::{
-    Angle, Count, Direction, Exponent, Ior, LARGEST_STRATA, Point, Radiance, Radius, Resolution,
-    SMALLEST, Share, Text, Value, normalized,
+    Angle, Count, Direction, LARGEST_STRATA, Point, Radiance, Radius, Resolution, SMALLEST, Text,
+    Value, normalized,
 };
-use super::{Bsdf, Camera, DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Light, Place, RenderHints, Shape};
+use super::{Camera, DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Light, Place, RenderHints, Shape};
 use glam::DVec3;
 
 /// Whether a key may be left out.
@@ -142,98 +142,6 @@ pub(super) fn render(t: &mut impl Table) -> RenderHints {
         strata: strata.map(|c| c.0),
         seed: seed.map(|c| c.0),
     }
-}
-
-/// The `type` of a material.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum MaterialKind {
-    Diffuse,
-    Mirror,
-    Dielectric,
-    Phong,
-}
-
-impl MaterialKind {
-    pub(super) const ALL: [Self; 4] = [Self::Diffuse, Self::Mirror, Self::Dielectric, Self::Phong];
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Diffuse => "diffuse",
-            Self::Mirror => "mirror",
-            Self::Dielectric => "dielectric",
-            Self::Phong => "phong",
-        }
-    }
-
-    pub(super) fn about(self) -> &'static str {
-        match self {
-            Self::Diffuse => "Lambertian reflection on both sides.",
-            Self::Mirror => "Perfect mirror on both sides.",
-            Self::Dielectric => "Smooth boundary of a solid such as glass. Not allowed on disks.",
-            Self::Phong => {
-                "Modified Phong (Lafortune & Willems 1994). diffuse + specular is at most 1 per channel."
-            }
-        }
-    }
-}
-
-/// `[material.NAME]` but for its `type`.
-pub(super) fn material(t: &mut impl Table, kind: MaterialKind) -> Option<Bsdf> {
-    match kind {
-        MaterialKind::Diffuse => {
-            let reflectance = t.required::<Share>("reflectance", "Hemispherical albedo.")?;
-            Some(Bsdf::Diffuse {
-                reflectance: reflectance.0,
-            })
-        }
-        MaterialKind::Mirror => {
-            let about = "Factor on the reflected radiance.";
-            let reflectance = t.defaulted("reflectance", Share(DVec3::ONE), about)?;
-            Some(Bsdf::Mirror {
-                reflectance: reflectance.0,
-            })
-        }
-        MaterialKind::Dielectric => {
-            /// Crown glass, the report's.
-            const GLASS: Ior = Ior(1.52);
-            let about = "Index of refraction, inside divided by outside.";
-            let ior = t.defaulted("ior", GLASS, about);
-            let about = "Tint, applied once per refraction.";
-            let transmittance = t.defaulted("transmittance", Share(DVec3::ONE), about);
-            Some(Bsdf::Dielectric {
-                ior: ior?.0,
-                transmittance: transmittance?.0,
-            })
-        }
-        MaterialKind::Phong => phong(t),
-    }
-}
-
-fn phong(t: &mut impl Table) -> Option<Bsdf> {
-    /// Decimal fractions such as 0.9 + 0.1 may come out above 1 by a rounding.
-    const ROUNDING: f64 = 1e-9;
-
-    let diffuse = t.required::<Share>("diffuse", "kd: albedo of the diffuse part.");
-    let specular = t.required::<Share>("specular", "ks: albedo of the specular lobe.");
-    let exponent = t.required::<Exponent>(
-        "exponent",
-        "n: the lobe is proportional to the cosine to the power n.",
-    );
-    let (diffuse, specular) = (diffuse?.0, specular?.0);
-    let sum = diffuse + specular;
-    if let Some(i) = (0..3).find(|&i| sum[i] > 1.0 + ROUNDING) {
-        let message = format!(
-            "diffuse[{i}] + specular[{i}] is {} + {} = {}, but must be at most 1",
-            diffuse[i], specular[i], sum[i]
-        );
-        t.refuse("specular", message);
-        return None;
-    }
-    Some(Bsdf::Phong {
-        diffuse,
-        specular,
-        exponent: exponent?.0,
-    })
 }
 
 /// The tables of shapes.

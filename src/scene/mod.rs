@@ -8,6 +8,7 @@ pub mod check;
 mod format;
 #[doc(hidden)]
 pub mod generate;
+mod material;
 mod order;
 pub mod parse;
 mod reader;
@@ -19,6 +20,8 @@ mod value;
 
 pub(crate) use build::checked;
 pub use build::{Invalid, SceneBuilder};
+pub use material::Bsdf;
+pub(crate) use material::{MaterialKind, Parameter};
 #[doc(hidden)]
 pub use order::Canonical;
 pub use rows::MAX_ROWS_BYTES;
@@ -115,37 +118,6 @@ pub struct Material {
 pub struct Place {
     pub line: usize,
     pub column: usize,
-}
-
-/// Scattering models; colours are linear RGB, 0..=1 per channel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Bsdf {
-    /// Lambertian, f = reflectance / π.
-    Diffuse {
-        /// Hemispherical albedo.
-        reflectance: DVec3,
-    },
-    /// Perfect mirror.
-    Mirror {
-        /// Factor on the incoming radiance.
-        reflectance: DVec3,
-    },
-    /// Smooth boundary of a solid.
-    Dielectric {
-        /// Index inside divided by the index just outside, > 0.
-        ior: f64,
-        /// Tint, once per refraction.
-        transmittance: DVec3,
-    },
-    /// f = diffuse/π + specular (n+2)/(2π) cosⁿα (Lafortune & Willems 1994).
-    Phong {
-        /// kd.
-        diffuse: DVec3,
-        /// ks; kd + ks <= 1 per channel.
-        specular: DVec3,
-        /// n >= 0.
-        exponent: f64,
-    },
 }
 
 /// A surface with a material.

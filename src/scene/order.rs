@@ -37,7 +37,7 @@ fn canonical(scene: &Scene) -> Scene {
     let decides = |a: usize, b: usize| {
         let (p, q) = (&s.primitives[in_order[a]], &s.primitives[in_order[b]]);
         // Two surfaces of one opaque material look the same, so it does not matter which is met.
-        let alike = p.material == q.material && !matches!(bsdf(p), Bsdf::Dielectric { .. });
+        let alike = p.material == q.material && !bsdf(p).is_dielectric();
         !alike && p.shape.may_coincide(&q.shape)
     };
     let kept = keep_file_order(&in_order, &shapes, decides);
@@ -119,20 +119,9 @@ fn light_key(l: &Light) -> Key {
 }
 
 fn bsdf_key(bsdf: &Bsdf) -> Key {
-    let numbers = |kind: f64, a: DVec3, b: DVec3, x: f64| {
-        let vectors = [a, b].map(|v| v.to_array());
-        key([kind, x].into_iter().chain(vectors.into_iter().flatten()))
-    };
-    match *bsdf {
-        Bsdf::Diffuse { reflectance } => numbers(0.0, reflectance, DVec3::ZERO, 0.0),
-        Bsdf::Mirror { reflectance } => numbers(1.0, reflectance, DVec3::ZERO, 0.0),
-        Bsdf::Dielectric { ior, transmittance } => numbers(2.0, transmittance, DVec3::ZERO, ior),
-        Bsdf::Phong {
-            diffuse,
-            specular,
-            exponent,
-        } => numbers(3.0, diffuse, specular, exponent),
-    }
+    let colors = bsdf.colors().into_iter().flat_map(|c| c.to_array());
+    let kind = f64::from(bsdf.kind() as u32);
+    key([kind].into_iter().chain(bsdf.numbers()).chain(colors))
 }
 
 /// Sorts the materials, and removes those that nothing uses or that are equal to another.

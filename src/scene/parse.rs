@@ -289,7 +289,7 @@ fn primitives(file: &mut Reader, materials: &[Named]) -> Vec<Option<Primitive>> 
                 }
             };
             if kind == ShapeKind::Disk
-                && matches!(materials[material].bsdf, Some(Bsdf::Dielectric { .. }))
+                && materials[material].bsdf.is_some_and(|b| b.is_dielectric())
             {
                 let message = format!(
                     "material {} is dielectric, but a disk is not solid; \

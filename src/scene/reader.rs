@@ -1,9 +1,9 @@
 //! Reads the tables of a scene file key by key, and reports missing, invalid and unknown keys with their place.
 
-use super::format::{self, Found, MaterialKind, Need, Table};
+use super::format::{Found, Need, Table};
 use super::source::{Faults, Source, quoted, suggestion};
 use super::value::{Text, Value};
-use super::{Bsdf, Place, rows, schema};
+use super::{Bsdf, MaterialKind, Place, rows, schema};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
@@ -210,7 +210,7 @@ impl<'a, 't> Reader<'a, 't> {
             self.refuse("type", message);
             return None;
         };
-        self.read_all(|t| format::material(t, kind))
+        self.read_all(|t| kind.read(t))
     }
 
     pub(super) fn refuse_unknown_keys(&mut self) {

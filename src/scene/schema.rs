@@ -1,8 +1,8 @@
 //! JSON Schema of scene files, for completion, hover texts and error checking in editors.
 
-use super::Place;
-use super::format::{self, Found, MaterialKind, Need, ShapeKind, Table};
+use super::format::{self, Found, Need, ShapeKind, Table};
 use super::value::{Text, Value};
+use super::{MaterialKind, Place};
 use serde_json::{Map, Value as Json, json};
 
 /// The description of `title`.
@@ -69,12 +69,12 @@ pub fn schema() -> Json {
 /// The keys of a material of `kind` besides `type`.
 pub(super) fn material_keys(kind: MaterialKind) -> Vec<String> {
     let mut description = Description::default();
-    format::material(&mut description, kind);
+    kind.read(&mut description);
     description.properties.into_iter().map(|p| p.0).collect()
 }
 
 fn material(kind: MaterialKind) -> Json {
-    let mut table = describe(kind.about(), |t| format::material(t, kind));
+    let mut table = describe(kind.about(), |t| kind.read(t));
     table["title"] = json!(kind.name());
     table["properties"]["type"] = json!({"const": kind.name(), "description": kind.about()});
     if let Some(required) = table["required"].as_array_mut() {

@@ -10,14 +10,10 @@ use glam::DVec3;
 /// beyond thirty million between eye and light would exceed it.
 const LARGEST_SCALE: f64 = 1e15;
 
-fn is_dielectric(bsdf: &Bsdf) -> bool {
-    matches!(bsdf, Bsdf::Dielectric { .. })
-}
-
 /// Turns opaque planes to the eye, and notes for opaque solids whether the eye is inside.
 pub(super) fn settle_sides(primitives: &mut [WorldPrimitive], materials: &[Bsdf], eye: DVec3) {
     for p in primitives {
-        if is_dielectric(&materials[p.material]) || matches!(p.geometry, Geometry::Disk { .. }) {
+        if materials[p.material].is_dielectric() || matches!(p.geometry, Geometry::Disk { .. }) {
             continue;
         }
         let eye_inside = p.geometry.holds(eye);
@@ -117,7 +113,7 @@ impl Media {
     /// Numbers the dielectric solids, and finds the parent of each.
     pub(super) fn new(primitives: &mut [WorldPrimitive], materials: &[Bsdf]) -> Self {
         let solids: Vec<usize> = (0..primitives.len())
-            .filter(|&i| is_dielectric(&materials[primitives[i].material]))
+            .filter(|&i| materials[primitives[i].material].is_dielectric())
             .collect();
         let index = Index::new(solids.iter().map(|&i| &primitives[i].geometry));
         let around: Vec<Vec<usize>> = (0..solids.len())

@@ -5,7 +5,6 @@
 
 use super::{FilmBox, Mark};
 use crate::film::coverage::Rect;
-use crate::scene::Bsdf;
 use crate::world::trace::{Hit, Met, Ray, camera_ray};
 use crate::world::{Geometry, World};
 use rayon::prelude::*;
@@ -50,10 +49,10 @@ pub(super) struct Chains {
 impl Chains {
     pub fn new(world: &World, size: [u32; 2], last_vertex: u32) -> Self {
         let ball = |center, radius| FilmBox::of_ball(&world.camera, size, center, radius);
-        let specular = world.primitives.iter().filter(|p| {
-            let bsdf = &world.materials[p.material];
-            matches!(bsdf, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. })
-        });
+        let specular = world
+            .primitives
+            .iter()
+            .filter(|p| world.materials[p.material].kind().is_specular());
         let bounds = specular.filter_map(|p| match p.geometry {
             Geometry::Sphere { center, radius } | Geometry::Disk { center, radius, .. } => {
                 ball(center, radius)

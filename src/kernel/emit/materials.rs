@@ -2,7 +2,7 @@
 
 use super::super::access::Access;
 use super::super::features::Features;
-use super::super::layout::MaterialKind;
+use crate::scene::MaterialKind;
 use std::fmt::Write as _;
 
 /// The two functions.
@@ -18,7 +18,7 @@ pub(in crate::kernel) fn dispatch(features: &Features) -> String {
         &all,
     ));
     if features.light_sampling {
-        let scattering: Vec<MaterialKind> = all.into_iter().filter(|m| !m.specular()).collect();
+        let scattering: Vec<MaterialKind> = all.into_iter().filter(|m| !m.is_specular()).collect();
         s.push_str(&over(
             features,
             "evaluate",

@@ -142,7 +142,7 @@ impl World {
                 let medium = if crossed { boundary.beyond } else { ray.medium };
                 (direction, medium)
             }
-            Bsdf::Diffuse { .. } | Bsdf::Phong { .. } => return None,
+            _ => return None,
         };
         Some(Ray {
             origin: hit.point,
