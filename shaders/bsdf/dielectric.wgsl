@@ -8,13 +8,13 @@ struct Refraction {
 }
 
 // For a ray that meets the boundary at cosine cos_i > 0; eta is the index ahead over the index behind.
-// Transmission is computed itself, for 1 - reflection would cancel near grazing.
+// The transmission is computed directly, because 1 - reflection would lose its digits near grazing incidence.
 fn refraction(cos_i: f32, eta: f32) -> Refraction {
     let cos2_t = 1.0 - (1.0 - cos_i) * (1.0 + cos_i) / (eta * eta);
     let cos_t = safe_sqrt(cos2_t);
     let s = cos_i + eta * cos_t;
     let p = eta * cos_i + cos_t;
-    // 2 eta c_i c_t (1 / s^2 + 1 / p^2), with one quotient; products of four cosines stay within f32.
+    // 2 eta c_i c_t (1 / s^2 + 1 / p^2), with one division. Products of four cosines stay within the range of f32.
     let inv_sp = 1.0 / fmax(s * p, TINY);
     let t = 2.0 * eta * cos_i * cos_t * ((s * s + p * p) * inv_sp * inv_sp);
     return Refraction(select(0.0, t, cos2_t > 0.0), cos_t);
@@ -26,8 +26,9 @@ fn refracted(d: vec3f, n: vec3f, cos_i: f32, cos_t: f32, eta: f32) -> vec3f {
     return renormalized(d * inv_eta + n * (cos_i * inv_eta - cos_t));
 }
 
-// Chance takes reflection or refraction in proportion to their light. Where a glance is told which way to go it weighs as many times
-// more as half of the glances are fewer than all: what glass reflects is a twentieth of what comes, and left to chance it is noise.
+// Reflection or refraction is chosen at random, in proportion to the light that each carries. A glance may be told which way to go: then
+// half of the glances go each way, and each counts twice the share of its way. Glass reflects about a twentieth of the light, so
+// a random choice would take the reflection too rarely, and its image would be noisy.
 fn sample_dielectric(x: ptr<function, Interaction>, u: Draws) -> Scattered {
     // The index inside over the index outside.
     let ior = x.material.exponent;

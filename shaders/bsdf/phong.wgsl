@@ -14,7 +14,7 @@ fn phong_power(w: vec3f, r: vec3f, exponent: f32) -> f32 {
 
 struct LobeSample {
     d: vec3f,
-    // cos^n(alpha) of d, from the random number itself.
+    // cos^n(alpha) of d, computed from the random number itself.
     power: f32,
 }
 
@@ -62,7 +62,7 @@ struct PhongSample {
     pdf: f32,
 }
 
-// A direction about normal n, of one of the lobes; r is where it mirrors the eye.
+// A direction from one of the two lobes about normal n, as `choice` selects. r is the mirror direction, the axis of the specular lobe.
 fn sample_lobes(kd: vec3f, ks: vec3f, exponent: f32, n: vec3f, r: vec3f, choice: f32, u: vec2f) -> PhongSample {
     let probability = lobe_probability(kd, ks);
     let from_lobe = choice < probability;
@@ -72,7 +72,7 @@ fn sample_lobes(kd: vec3f, ks: vec3f, exponent: f32, n: vec3f, r: vec3f, choice:
     let cos = dot(n, d);
     let value = phong_value(kd, ks, exponent, cos, power);
     let quotient = value.f_cos * (1.0 / fmax(value.pdf, TINY));
-    // Where there is no diffuse part the powers cancel, and nothing is left to divide.
+    // Without a diffuse part the powers in the quotient cancel, and only this is left.
     let pure = ks * ((exponent + 2.0) / (exponent + 1.0) * cos);
     // Below the horizon the sample counts as zero and is not drawn again.
     return PhongSample(d, select(vec3f(0.0), select(quotient, pure, probability >= 1.0), cos > 0.0), value.pdf);

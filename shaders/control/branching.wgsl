@@ -1,5 +1,5 @@
-// Branches, for kernels that loop over buffers or walk through trees: their long calls are worth skipping, and SwiftShader's
-// compiler, which gets only these, takes minutes over long blocks of straight code.
+// Branches, for kernels that loop over buffers or walk through trees: their calls are long, and worth skipping. SwiftShader gets no other
+// kernels, and its compiler takes minutes for long straight code.
 
 fn scatter_if(meets: bool, path: ptr<function, Path>, hit: Hit, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) -> bool {
     var lives = false;

@@ -1,4 +1,4 @@
-// No light sampling: there is no light, or nothing that scatters into more than one direction, or nothing is kept of such light.
+// No light sampling: the scene has no light, or no surface that scatters into more than one direction, or the picture keeps no such light.
 
 struct DirectLight {
     radiance: vec3f,

@@ -3,7 +3,7 @@
 fn direct_light(asks: bool, x: ptr<function, Interaction>, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     var direct = DirectLight(vec3f(0.0), 0.0);
     for (var k = 0u; k < u32(SHADOW_RAYS); k++) {
-        // The first one has the numbers of the vertex.
+        // The first sample takes the numbers of the vertex itself, which may be of low discrepancy.
         let more = draw(key + vec4u(0u, 0u, k << SHADOW_RAY_SHIFT, 0u));
         let point = select(more.light_point, u.light_point, k == 0u);
         let light = select(more.light, u.light, k == 0u);

@@ -1,5 +1,5 @@
-// What a large scene consists of, in one storage texture. Where each lane has an index of its own, lavapipe loads from a
-// buffer word by word, and from a sampled texture with a level of detail for each lane: ten and three times as slow.
+// The values of a large scene, in one storage texture. If each lane has an index of its own, the alternatives are slower on lavapipe: a
+// buffer is loaded word by word, ten times as slow, and a sampled texture with a level of detail for each lane, three times as slow.
 
 @group(0) @binding(0) var records: texture_storage_2d<rgba32uint, read>;
 
@@ -7,7 +7,7 @@ fn record(i: u32) -> vec4u {
     return textureLoad(records, vec2u(i % RECORDS_A_ROW, i / RECORDS_A_ROW));
 }
 
-// Of four records that lie side by side, the first being number 4 i: where they are.
+// The place of record 4 i. The three records after it lie beside it in the same row.
 fn four_records(i: u32) -> vec2u {
     return vec2u(i % (RECORDS_A_ROW / 4u) * 4u, i / (RECORDS_A_ROW / 4u));
 }

@@ -1,4 +1,5 @@
-// No glances: no light can be seen by the eye, directly or in mirrors and glass.
+// No glances: the eye can see no light, directly or in mirrors and glass; or the picture keeps no such light; or an older driver grants
+// too few loop trips.
 
 const MARK_WORDS: u32 = 0u;
 

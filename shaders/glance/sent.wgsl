@@ -1,18 +1,18 @@
 // Glances: extra camera rays of a sample, in pixels that the host marks. They gather nothing but lights, seen directly or by way of
 // mirrors and glass. The edge of a light, and of its image, is by far the noisiest thing in most pictures, and a camera ray costs
-// a tenth of a path. What glances see the path itself does not gather again.
+// a tenth of a path. The path itself does not gather again what its glances have seen.
 
 // A third word for each pixel: its mark.
 const MARK_WORDS: u32 = 1u;
 
 // What the mark of a pixel says.
 struct Sight {
-    // Glances of each sample, across x across.
+    // Glances of each sample: across x across.
     glances: u32,
     across: u32,
     // The last vertex at which they look for a light.
     depth: u32,
-    // The vertex of glass at which one half of them is refracted and the other reflected; 0: chance decides everywhere.
+    // The vertex of glass at which half of them are refracted and half reflected; 0: chance decides everywhere.
     branch: u32,
 }
 
@@ -47,13 +47,13 @@ fn glances_after(path: ptr<function, Path>, sight: Sight) -> u32 {
     return select(sight.glances, path.glances - 1u, is_glance(path));
 }
 
-// Every glance has random numbers of its own.
+// The seed of a vertex: every glance has random numbers of its own.
 fn vertex_seed(path: ptr<function, Path>) -> u32 {
     return params.seed ^ select(0u, path.glances * GLANCE_STREAM, GLANCE_CHAINS);
 }
 
-// What the path does if it meets glass now. At the vertex that the mark names one half of the glances is reflected: the black or the
-// white fields of a chess board, by a coin tossed for each sample.
+// What the path does if it meets glass now. At the vertex that the mark names, half of the glances are reflected and half refracted. The
+// halves are the black and the white fields of a chess board. A coin that is tossed for each sample decides which are reflected.
 fn way_at_glass(path: ptr<function, Path>, pixel: Pixel, s: u32, sight: Sight) -> u32 {
     let coin = hash_pixel(pixel.key, s, params.seed ^ COIN_STREAM).x;
     let field = (path.glances ^ ((path.glances - 1u) >> (sight.across >> 1u)) ^ coin) & 1u;

@@ -1,36 +1,38 @@
-// Light that reaches a diffuse surface by way of a mirror ball. Met by chance it is the noisiest light of a room with such a
-// ball: few directions lead there, and each brings the light's full radiance. But the ball shows every point of a light in
-// just one place, which can be found. So some paths are sent there, and those that come there by chance do not count it.
+// Light that reaches a diffuse surface by way of a mirror ball. Found by chance, it is the noisiest light of a room with such a ball: few
+// directions lead there, and each brings the light's full radiance. But the ball shows every point of a light in exactly one place,
+// which can be computed. So some paths are sent to the image of a light, and paths that get there by chance do not count the light.
 
-// What a path remembers of its last vertices: nothing; that the last one was diffuse; or, with the number of a mirror, that
-// this was the one after.
+// What a path remembers of its last vertices. FREE: nothing. FROM_DIFFUSE: the last one was diffuse. BY_MIRROR, with a mirror's number:
+// the last one was on that mirror, and the one before it was diffuse.
 const FREE: u32 = 0u;
 const FROM_DIFFUSE: u32 = 1u;
 const BY_MIRROR: u32 = 0x40000000u;
-// Or that it was sent, with the numbers of mirror and light; and that it has met the mirror; and that it went astray.
+// SENT, with the numbers of a mirror and a light: the path was sent to that image. SENT_AND_MET: it has met the mirror as well. ASTRAY:
+// it was sent, but has met a mirror in a place that does not show the light.
 const SENT: u32 = 0x80000000u;
 const SENT_AND_MET: u32 = 0xc0000000u;
 const ASTRAY: u32 = 0xffffffffu;
-// The mirror's number, in the lowest MIRROR_BITS, and the light's above it.
+// The mirror's number is in the lowest MIRROR_BITS bits, and the light's number in the bits above.
 const MIRROR_MASK: u32 = (1u << MIRROR_BITS) - 1u;
 
-// Where the ball is met at less than this cosine its light is left to chance. There the image is so narrow that it holds next
-// to nothing, and Newton's method may fail; elsewhere its four steps are right to 1e-6, by a million random places.
+// Where a path would meet the ball at a cosine below this, the light is left to chance. There the image is so narrow that it carries
+// almost no light, and Newton's method may fail. Elsewhere its four steps are accurate to 1e-6, as a test with a million random
+// positions has shown.
 const LEAST_IMAGE_COS: f32 = 0.25;
 
-// Points of a disk this much larger than the light are sought, so that rounding takes away none of the light itself.
+// Paths are sent to points of a disk that is larger than the light by this factor, so that rounding loses no part of the light.
 const IMAGE_RIM: f32 = 1.001;
 
-// A choice among the images, or that of none.
+// The choice of an image, or of none.
 struct ChosenImage {
     index: u32,
     taken: bool,
     inverse_probability: f32,
 }
 
-// About what a receiver at p with normal n gets by way of a ball, as light_weight counts it: seen from afar, the image of a
-// light is smaller by (radius / 2 distance)^2. `strength` has what does not depend on the receiver. 0 only where nothing
-// comes that way.
+// An estimate of what a receiver at p with normal n gets by way of a ball, in the unit of light_weight. Seen from afar, the image of a
+// light is smaller than the light by (radius / 2 distance)^2. `strength` holds the factors that do not depend on the receiver. The
+// estimate is 0 only where no light comes that way.
 fn image_weight(p: vec3f, n: vec3f, ball: Sphere, strength: f32) -> f32 {
     let to = ball.center - p;
     let inverse = inverseSqrt(fmax(dot(to, to), TINY_SQUARE));
@@ -39,9 +41,10 @@ fn image_weight(p: vec3f, n: vec3f, ball: Sphere, strength: f32) -> f32 {
     return select(0.0, strength * above * (per_length * per_length), per_length < 1.0);
 }
 
-// One step of Newton's method towards the place where a ball of radius 1 shows b to a: in the plane of both and the centre,
-// at distances 1 / inverse.x and 1 / inverse.y and an angle with this cosine and sine, from a unit vector m, whose angle is
-// counted from a, to a better one. A root of sin(m - rest) = sin(m) inverse.y - sin(rest) inverse.x, rest = angle - m.
+// One step of Newton's method, for the place where a ball of radius 1 shows point b to point a. All directions are in the plane of a, b
+// and the ball's centre, as (cosine, sine) of their angle from a, seen from the centre. `angle` is the direction of b, and m is an
+// estimate of the direction of the place; the result is a better one. a and b are at distances 1 / inverse.x and 1 / inverse.y from the
+// centre. The equation is sin(m - rest) = sin(m) inverse.y - sin(rest) inverse.x, with rest = angle - m.
 fn image_step(m: vec2f, angle: vec2f, inverse: vec2f) -> vec2f {
     let rest = vec2f(dot(angle, m), angle.y * m.x - angle.x * m.y);
     let f = m.y * rest.x - m.x * rest.y - m.y * inverse.y + rest.y * inverse.x;
@@ -60,7 +63,7 @@ struct ImageSample {
 
 // A direction from p to the image of a light, uniform in area on the light.
 fn sample_image(p: vec3f, ball: Sphere, light: DiskLight, u: vec2f) -> ImageSample {
-    // The ball's radius is the unit.
+    // Lengths are in units of the ball's radius.
     let unit = 1.0 / ball.radius;
     let radius = light.radius * (IMAGE_RIM * unit);
     let circle = unit_circle(u.y) * (radius * sqrt(u.x));
@@ -72,7 +75,7 @@ fn sample_image(p: vec3f, ball: Sphere, light: DiskLight, u: vec2f) -> ImageSamp
     let across = b * inverse.y - cos_angle * x;
     let inverse_sin = inverseSqrt(fmax(dot(across, across), TINY_SQUARE));
     let angle = vec2f(cos_angle, dot(across, across) * inverse_sin);
-    // To begin with what is exact for small angles.
+    // The first estimate is exact for small angles.
     var m = vec2f(1.0 - inverse.y + (1.0 - inverse.x) * angle.x, (1.0 - inverse.x) * angle.y);
     m *= inverseSqrt(fmax(dot(m, m), TINY_SQUARE));
     m = image_step(m, angle, inverse);
@@ -89,15 +92,15 @@ fn sample_image(p: vec3f, ball: Sphere, light: DiskLight, u: vec2f) -> ImageSamp
     let cos = -dot(d, normal);
     let cos_onward = dot(onward, normal) * inverse_onward;
     let cos_light = -dot(light.normal, onward) * inverse_onward;
-    // A narrow bundle of rays grows by sum + curved / cos in the plane of the ray and the normal, and by sum + curved cos
-    // across it (Coddington's equations).
+    // Coddington's equations: a narrow bundle of rays spreads by sum + curved / cos in the plane of incidence, and by sum + curved cos
+    // across it.
     let distance = dot(there, d);
     let beyond = dot(onward, onward) * inverse_onward;
     let sum = distance + beyond;
     let curved = 2.0 * distance * beyond;
     let growth = (sum * cos + curved) * (sum + curved * cos);
-    // There is no such place where the ball itself lies between, and Newton's method stays on its way then, or finds one
-    // where the ray would go through.
+    // If the ball hides the light from p, there is no such place. Then Newton's method does not converge, or it converges to a place
+    // where the ray would pass through the ball.
     let found = abs(before.x * m.y - before.y * m.x) < 0.01 && fmin(cos, cos_onward) > 0.5 * LEAST_IMAGE_COS;
     let seen = found && cos_light > 0.0 && inverse.x < 1.0;
     let inverse_pdf = PI * radius * radius * cos_light * cos / fmax(growth, TINY);

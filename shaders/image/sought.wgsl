@@ -1,15 +1,16 @@
 // The part of the path loop that seeks lights in mirror balls: see mirror_ball.wgsl.
 
-// Turns of the path loop for one in which paths are sent: few are, and a software adapter goes through a conditional statement for all
-// lanes as soon as one needs it. src/kernel/images.rs puts the loop over these turns around the vertex of path.wgsl. 8 and 12 were
-// as fast, 2, 4, 6 and 16 slower.
+// After this many turns of the path loop, all paths that wait to be sent are sent together. Few paths are sent, and a software adapter
+// runs a branch for all lanes as soon as one lane needs it. src/kernel/images.rs puts a loop over these turns around the vertex of
+// path.wgsl. 8 and 12 were equally fast; 2, 4, 6 and 16 were slower.
 const TURNS: u32 = 8u;
 
-// What a path remembers of its way; whether it is to be sent to an image, where the ray's direction holds two random numbers and the
-// image's number; and the normal there.
 struct ImageTrail {
+    // What the path remembers of its last vertices: see mirror_ball.wgsl.
     memory: u32,
+    // The path waits to be sent to an image. Until then the direction of its ray holds two random numbers and the image's number.
     sends: bool,
+    // The normal where its ray starts.
     normal: vec3f,
 }
 
@@ -22,12 +23,13 @@ fn is_sent(trail: ImageTrail) -> bool {
     return trail.memory >= SENT;
 }
 
-// A path that is sent has nothing to do at anything but mirrors.
+// A path that was sent to an image ends at every surface that is not a mirror.
 fn trail_goes_on(trail: ImageTrail, x: ptr<function, Interaction>) -> bool {
     return !is_sent(trail) || is_mirror(x.material);
 }
 
-// Sends some paths from diffuse surfaces to an image, and follows them by way of its mirror. True if the path went astray.
+// At a diffuse surface: chooses whether the path is sent to an image. At a mirror: checks that a path that was sent has met the right
+// mirror. Returns whether the path has gone astray.
 fn follow_images(path: ptr<function, Path>, x: ptr<function, Interaction>, light_weights: f32, u: Draws, s: ptr<function, Scattered>) -> bool {
     let diffuse = is_diffuse(x.material);
     let mirror = is_mirror(x.material);

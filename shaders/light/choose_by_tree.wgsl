@@ -1,42 +1,43 @@
-// Choosing one of many lights: down a balanced tree of clusters [Conty2018], each time in proportion to what the two
-// halves could send, then among the few lights of a cluster by what each would send.
+// Chooses one of many lights by a balanced tree of clusters [Conty2018]. Each level takes one of two halves, in proportion to what
+// each could send. The last cluster holds few lights, and the choice among them is in proportion to their weights.
 
 // A cluster: a ball that holds its lights, and a cone that holds their normals.
 struct LightCluster {
     center: vec3f,
     radius: f32,
-    // Unit axis of the cone times the power, up to a factor; zero: nothing shines.
+    // Unit axis of the cone times the power, up to a factor. Zero if no light of the cluster shines.
     power: vec3f,
-    // Cosine of its half angle.
+    // Cosine of the cone's half angle.
     cos_cone: f32,
 }
 
-// Cluster k has the halves 2k and 2k + 1; the first is 1. The last LIGHT_CLUSTERS have four lights each.
+// The halves of cluster k are 2k and 2k + 1. Cluster 1 holds all lights. The last LIGHT_CLUSTERS clusters are leaves, with at most four
+// lights each.
 fn light_cluster(k: u32) -> LightCluster {
     let a = bitcast<vec4f>(record(CLUSTER_RECORDS + 2u * k));
     let b = bitcast<vec4f>(record(CLUSTER_RECORDS + 2u * k + 1u));
     return LightCluster(a.xyz, a.w, b.xyz, b.w);
 }
 
-// The lights of such a cluster; NONE where there is none.
+// The lights of a leaf; NONE where it has fewer than four.
 fn lights_of(cluster: u32) -> vec4u {
     return record(FOUR_RECORDS + cluster - LIGHT_CLUSTERS);
 }
 
-// About what the cluster sends to a receiver at p; 0 only when none of it can.
+// An estimate of what the cluster sends to a receiver at p. It is 0 only if no light of the cluster can send anything.
 fn cluster_importance(c: LightCluster, p: vec3f, at: Receiver) -> f32 {
     let power = length(c.power);
     let v = p - c.center;
     let distance = length(v);
-    // How far before the receiver's plane any of the ball lies, and p before the plane of any light: its normal is at best
-    // turned from the cone's axis towards p, by the cone's half angle.
+    // `receiver` is the greatest height of any point of the ball above the receiver's plane. `light` is the greatest height that p can
+    // have above the plane of any light: its normal is at best the cone's axis, turned towards p by the cone's half angle.
     let receiver = c.radius - dot(at.n, v);
     let along = dot(c.power, v) / max(power, TINY);
     let turned = c.cos_cone * along + safe_sqrt((1.0 - c.cos_cone * c.cos_cone) * max(distance * distance - along * along, 0.0));
     let light = c.radius + select(turned, distance, along >= c.cos_cone * distance);
     let far = distance > c.radius;
     let inverse = 1.0 / max(max(distance, c.radius), TINY);
-    // Cosines have errors, the more in the small ones.
+    // Cosines have rounding errors, which are relatively larger in small ones.
     let cosines = vec2f(light, receiver) * inverse;
     let dark = power == 0.0 || (far && (cosines.x < -0.002 || cosines.y < -0.002));
     let both = clamp(cosines, vec2f(0.01), vec2f(1.0));
@@ -50,7 +51,7 @@ fn first_half(k: u32, p: vec3f, at: Receiver) -> f32 {
     let a = min(cluster_importance(light_cluster(2u * k), p, at), 1.0e30);
     let b = min(cluster_importance(light_cluster(2u * k + 1u), p, at), 1.0e30);
     let share = a / max(a + b, TINY);
-    // The importance is a guess: neither half that may shine is left to less than one choice in five hundred.
+    // The importance is only an estimate: if both halves may shine, each is chosen with a probability of at least 1 in 500.
     return select(share, clamp(share, 0.002, 0.998), a > 0.0 && b > 0.0);
 }
 
@@ -68,7 +69,7 @@ fn weights_of(four: vec4u, p: vec3f, at: Receiver) -> vec4f {
     );
 }
 
-// Two random numbers: so many levels would use up the digits of one.
+// Takes two random numbers, because so many levels would use up the digits of one.
 fn choose_light(p: vec3f, at: Receiver, u: vec2f) -> Chosen {
     var k = 1u;
     var v = u.x;
@@ -90,7 +91,7 @@ fn choose_light(p: vec3f, at: Receiver, u: vec2f) -> Chosen {
     let three = two + weights.z;
     let sum = three + weights.w;
     let chosen_at = v * sum;
-    // The last one with any weight whose share begins at or below it.
+    // The last light that has weight and whose share begins at or below chosen_at.
     var found = four.x;
     var chosen = weights.x;
     let second = weights.y > 0.0 && (chosen_at >= weights.x || chosen == 0.0);

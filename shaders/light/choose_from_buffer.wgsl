@@ -1,5 +1,6 @@
-// Choosing one of the lights in the buffer, in proportion to its weight. One pass: each light replaces the choice with its share of
-// the sum so far, and the random number is stretched to be used again.
+// Chooses one of the lights in the buffer, with a probability in proportion to its weight. One pass is enough (weighted reservoir
+// sampling): each light replaces the choice so far with a probability of its share of the sum so far, and the random number is
+// rescaled to [0, 1) for the next light.
 
 fn choose_light(p: vec3f, to: Receiver, u: vec2f) -> Chosen {
     var index = 0u;

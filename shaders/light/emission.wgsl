@@ -1,6 +1,6 @@
 // Lights that a path meets by chance.
 
-// What a light that the path meets by chance adds, before the path's weight.
+// The radiance of a light that the path meets by chance, without the path's factor beta.
 fn emission(path: ptr<function, Path>, hit: Hit) -> vec3f {
     let index = hit.key >> 2u;
     let light = light_at(index);

@@ -1,6 +1,6 @@
-// Lights that overlap in one plane: the first hides those after it.
+// Lights that overlap in one plane: the first hides the others.
 
-// Whether a light before number `light` in its plane lies at the end of the shadow ray.
+// Whether the shadow ray ends on a light that lies in the same plane as number `light` and comes before it.
 fn hidden_by_light(ray: Ray, distance: f32, light: u32) -> bool {
     let p = ray.o + distance * ray.d;
     var hidden = false;

@@ -1,11 +1,11 @@
-// Receivers of light in scenes with glossy materials: which light, and which point of it, depends on the lobe.
+// Receivers of light in scenes with glossy materials. The lobe affects which light is chosen, and which point on it.
 
-// What lights are chosen for at some point: its normal there, and how it scatters.
+// The surface for which a light is chosen: its normal, and how it scatters.
 struct Receiver {
     n: vec3f,
-    // Where it mirrors the eye.
+    // wo mirrored about n: the axis of the lobe.
     r: vec3f,
-    // How much of all light it scatters, and at most of light from r, in one unit; and an eighth of the lobe's exponent.
+    // The diffuse part of f, and the specular part at its greatest, for light from r; both times pi. Then an eighth of the exponent.
     diffuse: f32,
     specular: f32,
     narrow: f32,
@@ -24,9 +24,9 @@ fn receiver_at(x: ptr<function, Interaction>) -> Receiver {
     );
 }
 
-// About how much it scatters of the light of things in a ball of this radius; `to` leads to its centre, 1 / `inverse` far. At an
-// angle alpha off the lobe's axis cos^n(alpha) is about exp(-n sin^2(alpha) / 2), for which (1 + n sin^2(alpha) / 8)^-4
-// stands; over the ball it is as much flatter as it is wider.
+// An estimate of how much of the light from a ball of this radius the receiver scatters. `to` leads to the ball's centre, at distance
+// 1 / `inverse`. At an angle alpha to the lobe's axis, cos^n(alpha) is about exp(-n sin^2(alpha) / 2), which is approximated by
+// (1 + n sin^2(alpha) / 8)^-4. The mean over a ball is a wider lobe, whose peak is lower by the same factor.
 fn scattered(at: Receiver, to: vec3f, inverse: f32, radius: f32) -> f32 {
     let along = dot(to, at.r) * inverse;
     let off2 = select(1.0, fmax(1.0 - along * along, 0.0), along > 0.0);
@@ -37,8 +37,9 @@ fn scattered(at: Receiver, to: vec3f, inverse: f32, radius: f32) -> f32 {
     return at.diffuse + at.specular * (ratio * ratio) * (ratio * ratio) / flat;
 }
 
-// One of two opposite points of the cap, by how much light the receiver about scatters from there [Talbot2005]. A lobe often
-// sees just a part of a light. With a second point drawn afresh the variance was the same, with three or four hardly less.
+// Resampled importance sampling [Talbot2005]: takes one of two opposite points of the cap, in proportion to an estimate of how much
+// light the receiver scatters from there. A lobe often covers only a part of a light. With a second random point instead of the
+// opposite one the variance was the same; with three or four points it was hardly less.
 fn sample_light(light: DiskLight, cap: Cap, at: Receiver, u: vec2f, choice: f32) -> LightSample {
     let outwards = from_frame(light.normal, vec3f(unit_circle(u.y), 0.0));
     let opposite = fract(u.x + 0.5);

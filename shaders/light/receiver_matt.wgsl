@@ -1,6 +1,6 @@
 // Receivers of light in scenes without glossy materials.
 
-// What lights are chosen for at some point: its normal there.
+// The surface for which a light is chosen: its normal.
 struct Receiver {
     n: vec3f,
 }
@@ -9,7 +9,7 @@ fn receiver_at(x: ptr<function, Interaction>) -> Receiver {
     return Receiver(x.n);
 }
 
-// How much of the light of things in a ball it scatters, up to a factor: see receiver_glossy.wgsl.
+// How much of the light from a ball the receiver scatters, up to a factor: see receiver_glossy.wgsl.
 fn scattered(at: Receiver, to: vec3f, inverse: f32, radius: f32) -> f32 {
     return 1.0;
 }

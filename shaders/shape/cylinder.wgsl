@@ -1,14 +1,15 @@
-// Capped cylinders as the common part of an infinite cylinder and the slab between the caps: the interval
-// of the ray inside one intersected with that inside the other, which makes the rim watertight
-// [Cychosz1994]. In the plane across the axis, A = |d|^2, B = m.d, and the discriminant is A (r^2 - |w|^2)
-// with w the nearest point to the axis, which keeps the precision that B^2 - A C loses.
+// Capped cylinders. A capped cylinder is the intersection of an infinite cylinder and the slab between the caps. A ray is inside it
+// where it is inside both, so its interval is the intersection of two intervals, which makes the rim watertight [Cychosz1994].
+//
+// In the plane across the axis, A = |d|^2 and B = m.d. The discriminant is A (r^2 - |w|^2), where w is the point of the ray's line
+// nearest to the axis. This form keeps the precision that B^2 - A C loses.
 
 // Parts of a cylinder's key.
 const CYLINDER_SIDE: u32 = 0u;
 const CYLINDER_BASE: u32 = 1u;
 const CYLINDER_TOP: u32 = 2u;
 
-// Below this squared sine to the axis a ray runs along it: only the caps can be met.
+// A ray whose squared sine to the axis is below this counts as parallel to the axis, and can meet only the caps.
 const ALONG_AXIS: f32 = 1.0e-12;
 
 struct Cylinder {
@@ -23,7 +24,7 @@ struct Cylinder {
 struct Span {
     enter: f32,
     leave: f32,
-    // Whether a cap bounds it there, not the side.
+    // Whether it enters and leaves through a cap, not through the side.
     enter_by_cap: bool,
     leave_by_cap: bool,
     // The ray runs up the axis.
@@ -33,8 +34,8 @@ struct Span {
 }
 
 fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span {
-    // The slab between the caps. A cap that lies in the plane the ray stands on is at distance 0. The product
-    // is that of planes and disks, so that what coincides is met at the same distance to the bit.
+    // The slab between the caps. If the ray starts in the plane of a cap, that cap is at distance 0. The formula is that of planes
+    // and disks, so coincident faces are met at the same distance, to the last bit.
     let along = dot(c.axis, ray.d);
     let inv_cos = safe_inverse(along);
     let height = dot(c.axis, ray.o);
@@ -53,7 +54,7 @@ fn cylinder_span(ray: Ray, c: Cylinder, side: u32, base: u32, top: u32) -> Span 
     let inv_a = 1.0 / fmax(a, ALONG_AXIS);
     let w = m - d * select(b * inv_a, 0.0, parallel);
     let inside = c.radius * c.radius - dot(w, w);
-    // Standing on the side, one root is 0 and the other is known without it: as if the square root were |b|.
+    // If the ray starts on the side, one root is exactly 0, so the square root must be |b|.
     let root = select(safe_sqrt(a * inside), abs(b), ray.face == side);
     let near = select((-b - root) * inv_a, -FAR, parallel);
     let far = select((root - b) * inv_a, FAR, parallel);
@@ -89,7 +90,8 @@ fn enters(ray: Ray, s: Span, side: u32, base: u32, top: u32) -> bool {
 #endif
 }
 
-// Whether a ray from inside meets it, as it does but for the cap on which a light lies flush.
+// Whether a ray from inside meets the cylinder. It always does, unless it is a shadow ray that leaves through the cap on which its
+// light lies flush.
 fn leaves(ray: Ray, s: Span, base: u32, top: u32) -> bool {
 #if LIT_CAPS
     return !(s.leave_by_cap && ray.target_face == select(base, top, s.up));
@@ -119,7 +121,7 @@ fn cylinder_boundary(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top:
     return nearer(hit, met, t, key + select(enter_part(s), leave_part(s), inside));
 }
 
-// For shadow rays: whatever starts inside a solid that holds no light is in its shadow.
+// The same for shadow rays, if the solid holds no light: every ray that starts inside is blocked.
 fn cylinder_boundary_shadow(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
     let met = ray.medium == solid || (ray.medium == parent && enters(ray, s, side, base, top) && s.enter < hit.t);

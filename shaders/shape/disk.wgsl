@@ -1,5 +1,5 @@
-// Flat disks, two-sided. Neither the face that a ray stands on nor the one that a shadow ray aims at is met,
-// nor anything else in that plane.
+// Flat disks, two-sided. A ray does not meet the face that it stands on, and a shadow ray does not meet the face that it aims at.
+// Coincident faces share an identity, so neither meets anything else in that plane.
 
 struct Disk {
     center: vec3f,

@@ -1,6 +1,5 @@
-// Spheres far larger than the scene, by curvature, as lens designers write them: about the surface point
-// nearest the scene the quadratic is k t^2 + 2 B t + C = 0, whose coefficients stay small. At k = 0 it is
-// the plane.
+// Spheres far larger than the scene, given by their curvature k, as in lens design. Relative to the surface point nearest the scene,
+// the quadratic is k t^2 + 2 B t + C = 0. Its coefficients stay small, and with k = 0 it is the equation of a plane.
 
 struct HugeSphere {
     pole: vec3f,
@@ -9,7 +8,7 @@ struct HugeSphere {
 }
 
 struct HugeRoots {
-    // B, negated: positive when heading inwards.
+    // -B: positive if the ray heads inwards.
     b: f32,
     // Twice the height above the surface, to first order.
     c: f32,

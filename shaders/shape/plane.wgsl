@@ -5,17 +5,16 @@ struct Plane {
     offset: f32,
 }
 
-// An opaque plane whose normal is on the eye's side, which no path ever leaves: whatever heads towards
-// the plane meets it, now if rounding put the origin behind it, and nothing else does. So no ray leaks
-// through the edge of a closed room.
+// An opaque plane whose normal points to the eye's side. No path ever leaves that side, so a ray meets the plane exactly if it heads
+// towards it. If rounding has put the origin behind the plane, the hit is at distance 0. So no ray leaks through the edge of a closed
+// room.
 fn plane_front(hit: Hit, ray: Ray, p: Plane, face: u32, key: u32) -> Hit {
     let cos = dot(p.normal, ray.d);
     let t = (p.offset - dot(p.normal, ray.o)) * safe_inverse(cos);
     return nearer(hit, cos < 0.0 && ray.target_face != face, fmax(t, 0.0), key);
 }
 
-// Two opaque planes that face each other, n.p = low.offset below and n.p = high above: a ray meets the one
-// that it heads for.
+// Two opaque planes that face each other: n.p = low.offset below, and n.p = high above. A ray meets the one that it heads towards.
 fn plane_pair(hit: Hit, ray: Ray, low: Plane, high: f32, low_key: u32, high_key: u32) -> Hit {
     let cos = dot(low.normal, ray.d);
     let down = cos < 0.0;
@@ -24,7 +23,7 @@ fn plane_pair(hit: Hit, ray: Ray, low: Plane, high: f32, low_key: u32, high_key:
     return nearer(hit, cos != 0.0, fmax(t, 0.0), key);
 }
 
-// The boundary of a dielectric half-space, which lies behind the normal.
+// The boundary of a dielectric half-space. The normal points out of the dielectric.
 fn plane_boundary(hit: Hit, ray: Ray, p: Plane, face: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let cos = dot(p.normal, ray.d);
     let t = (p.offset - dot(p.normal, ray.o)) * safe_inverse(cos);

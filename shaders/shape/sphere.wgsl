@@ -1,15 +1,14 @@
-// Spheres [Haines2019]: with f from centre to origin and b = -f.d, the part l of f across the ray
-// gives the discriminant r^2 - l.l without the cancellation of b^2 - c. The roots are taken as b -+ sqrt(disc): c/q would
-// keep the digits of a small root, but c = f.f - r^2 has lost as many, and what is met is put back on its surface.
+// Spheres [Haines2019]. f leads from the centre to the origin of the ray, and b = -f.d. The part l of f across the ray gives the
+// discriminant r^2 - l.l, without the cancellation of b^2 - c. The roots are b -+ sqrt(disc). For a small root the form c/q would not
+// be more accurate, because c = f.f - r^2 has lost as many digits; and every hit is moved onto its surface afterwards.
 
 struct Sphere {
     center: vec3f,
     radius: f32,
 }
 
-// The entering root, for a ray known to be outside. An origin that rounding put a little inside is on
-// the surface: the hit is at 0 if the ray heads inwards, else there is none. The surface is convex, so
-// a ray that leaves its face never comes back to it.
+// The entering root, for a ray known to be outside. If rounding has put the origin slightly inside, the hit is at distance 0 if the
+// ray heads inwards, and there is none otherwise. A sphere is convex, so a ray that starts on its outside never meets it again.
 fn sphere_outside(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     let f = ray.o - s.center;
     let b = -dot(f, ray.d);
@@ -19,9 +18,8 @@ fn sphere_outside(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     return nearer(hit, disc >= 0.0 && b > 0.0 && ray.face != face, t, key);
 }
 
-// Whether sphere_outside would meet anything nearer than hit.t, without root or quotient: for shadow rays,
-// which need no distance. The entering root b - sqrt(disc) lies below t where b does, or where
-// disc > (b - t)^2.
+// For shadow rays, which need no distance: whether sphere_outside would find a hit nearer than hit.t. This takes no square root: the
+// entering root b - sqrt(disc) is less than t if b < t, or if disc > (b - t)^2.
 fn sphere_shadow(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     let f = ray.o - s.center;
     let b = -dot(f, ray.d);
@@ -32,8 +30,7 @@ fn sphere_shadow(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     return Hit(hit.t, select(hit.key, key, met));
 }
 
-// The leaving root, for a ray known to be inside. From the sphere's own face the other root, 0, is
-// divided out.
+// The leaving root, for a ray known to be inside. If the ray starts on the sphere, one root is exactly 0, and the other is 2 b.
 fn sphere_inside(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32) -> Hit {
     let f = ray.o - s.center;
     let b = -dot(f, ray.d);
@@ -57,7 +54,7 @@ fn sphere_boundary(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u3
     return nearer(hit, inside || enters, fmax(t, 0.0), key);
 }
 
-// For shadow rays: whatever starts inside a solid that holds no light is in its shadow.
+// The same for shadow rays, if the solid holds no light: every ray that starts inside is blocked.
 fn sphere_boundary_shadow(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let outside = sphere_shadow(hit, ray, s, face, key);
     let met = ray.medium == solid || (ray.medium == parent && outside.key != hit.key);

@@ -1,13 +1,13 @@
-// What was met: the point put back on its surface, the normal, and the material.
+// What a ray has met: the point, moved onto its surface, the normal, and the material.
 
-// One element per key / 4, lights first. A sphere is a cylinder without an axis, a plane has no radius.
+// One for each surface, lights first: its number is key / 4. A sphere counts as a cylinder whose axis is zero. A plane has no radius.
 struct Surface {
-    // Centre, base, or (huge sphere) pole.
+    // Centre; of a cylinder, the centre of its base; of a huge sphere, the pole.
     point: vec3f,
     radius: f32,
-    // Normal of what is flat, axis of a cylinder, zero for spheres.
+    // Normal of a flat surface, axis of a cylinder, normal at the pole of a huge sphere; zero for a sphere.
     axis: vec3f,
-    // axis . p on the plane; of a cylinder's base.
+    // axis . p on the plane, or on the base of a cylinder; curvature of a huge sphere.
     offset: f32,
     // Identities of the faces of parts 0, 1, 2: 1 + the key of the first face in the same plane.
     faces: vec3u,
@@ -15,7 +15,7 @@ struct Surface {
     material: u32,
     // axis . p on a cylinder's top.
     top: f32,
-    // The dielectric solid bounded, and the one around it.
+    // The dielectric solid that it bounds, and the one around that.
     solid: u32,
     parent: u32,
     // A SHAPE_ constant.
@@ -30,7 +30,7 @@ fn face_of(s: Surface, part: u32) -> u32 {
 #endif
 }
 
-// Scattering parameters; which of them mean something depends on `kind`, a MATERIAL_ constant.
+// Scattering parameters. `kind`, a MATERIAL_ constant, decides which of them are used.
 struct Material {
     // Reflectance, transmittance, or kd.
     color: vec3f,
@@ -44,7 +44,7 @@ struct Material {
 struct Vertex {
     // On the surface.
     p: vec3f,
-    // Unit normal on the outside of a solid, the front of what is flat.
+    // Unit normal, on the outside of a solid or the front of a flat surface.
     n: vec3f,
 }
 
@@ -64,7 +64,7 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
 #endif
     var v = Vertex(p - s.axis * (dot(s.axis, p) - offset), s.axis);
 #if CYLINDER
-    // The base looks down the axis.
+    // The outward normal of the base is opposite to the axis.
     v.n = select(v.n, -v.n, part == 1u);
 #endif
 #endif
@@ -73,7 +73,7 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
     let along = s.axis * dot(s.axis, m);
     let across = m - along;
     let distance2 = dot(across, across);
-    // A surface smaller than the rounding of its place may be met at its very centre.
+    // If a surface is smaller than the rounding error of its position, the hit may be at its very centre.
     let n = select(across * inverseSqrt(fmax(distance2, TINY_SQUARE)), -ray.d, distance2 < TINY_SQUARE);
     let round = Vertex(s.point + along + s.radius * n, n);
 #if FLAT
@@ -84,7 +84,7 @@ fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
 #endif
 #endif
 #if HUGE_SPHERE
-    // axis: the normal at the pole; offset: the curvature. Down along the normal by the height.
+    // Moves the point along the normal by its height above the surface. s.axis is the normal at the pole, s.offset the curvature.
     let w = p - s.point;
     let normal = normalize(s.axis + s.offset * w);
     let height = 0.5 * s.offset * dot(w, w) + dot(s.axis, w);

@@ -14,7 +14,7 @@ fn permute(i: u32, count: u32, p: u32) -> u32 {
     mask |= mask >> 8u;
     mask |= mask >> 16u;
     var k = permute_step(i, mask, p);
-    // Fewer than half of all values lie outside; each is sent on until it lies inside.
+    // Fewer than half of all values are outside the range. Each is permuted again until it is inside.
     while k >= count {
         k = permute_step(k, mask, p);
     }

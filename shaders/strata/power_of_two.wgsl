@@ -1,6 +1,6 @@
-// STRATA x STRATA cells of a pixel, a power of two, visited in an order that is shuffled for every round of STRATA^2 samples.
+// STRATA x STRATA cells of a pixel, visited in an order that is shuffled for every round of STRATA^2 samples. STRATA is a power of two.
 
-// Position i of a random permutation of `count` cells.
+// Position i of a random permutation of `count` cells: an XOR is enough, because `count` is a power of two.
 fn shuffled_cell(i: u32, count: u32, order: u32) -> u32 {
     return (i ^ (order >> 16u)) % count;
 }

@@ -7,7 +7,8 @@ fn $walk(ray: Ray, first: Hit) -> Hit {
     var at = Place(1u, 0u);
     while at.node != 0u && $goes_on trips_left > 0u {
         trips_left -= 1u;
-        // On to the next leaf whose box is met: a branch that is masked off would cost its time at every visit.
+        // Goes to the next leaf whose box is met. A test of the leaf inside this loop would take its time at every visit, even if it
+        // is masked off.
         var item = 0u;
         while at.node != 0u && item == 0u && trips_left > 0u {
             trips_left -= 1u;

@@ -7,7 +7,7 @@ fn $walk(ray: Ray, first: Hit) -> Hit {
     var at = Place(1u, 0u);
     while at.node != 0u && $goes_on trips_left > 0u {
         trips_left -= 1u;
-        // Two visits a trip: the trips that older drivers grant go farther, and it costs nothing.
+        // Two visits in each loop trip: older drivers limit the number of trips, and this takes no longer.
         at = $walk_visit(ray, slabs, at, &hit);
         at = $walk_visit(ray, slabs, at, &hit);
     }

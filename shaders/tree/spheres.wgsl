@@ -1,4 +1,5 @@
-// A walk through a tree of spheres, whose nodes hold the spheres themselves: one costs no more than a box, and needs no visit of its own.
+// A walk through a tree of spheres. A node holds its spheres themselves: a sphere takes no longer to test than a box, and needs no visit
+// of its own.
 // A template: src/kernel/trees.rs fills in the names that begin with a dollar sign, once for the nearest hit and once for shadow rays.
 
 fn $walk(ray: Ray, first: Hit) -> Hit {
@@ -7,7 +8,7 @@ fn $walk(ray: Ray, first: Hit) -> Hit {
     var at = Place(1u, 0u);
     while at.node != 0u && $goes_on trips_left > 0u {
         trips_left -= 1u;
-        // Two visits a trip: the trips that older drivers grant go farther, and it costs nothing.
+        // Two visits in each loop trip: older drivers limit the number of trips, and this takes no longer.
         at = $walk_visit(ray, slabs, at, &hit);
         at = $walk_visit(ray, slabs, at, &hit);
     }

@@ -19,14 +19,14 @@ const LEAF: u32 = 0xffffffffu;
 // Farther than anything.
 const MISSED: f32 = 1.0e38;
 
-// Loop trips left to the invocation: see trips/counted.wgsl. When none are left the walk is no use, and the sample begins again in the
-// next dispatch.
+// Loop trips left to the invocation: see trips/counted.wgsl. When none are left, the result of the walk is not used, and the sample begins
+// again in the next dispatch.
 var<private> trips_left: u32 = 0xffffffffu;
 
 // A ray made ready for boxes.
 struct Slabs {
-    // Its origin, moved by what rounding may do to it or to a hit: against the sides that it enters by, and that it leaves
-    // by. The walk must not miss what a loop over all surfaces would meet.
+    // The ray's origin, moved by the greatest rounding error of the origin or of a hit: `enter` for the sides of a box by which the ray
+    // enters, `leave` for those by which it leaves. The walk must not miss what a loop over all surfaces would meet.
     enter: vec3f,
     leave: vec3f,
     inverse: vec3f,
@@ -34,11 +34,11 @@ struct Slabs {
 }
 
 fn slabs_of(ray: Ray, reach: f32) -> Slabs {
-    // Components of either zero, and those that might as well be, become large numbers of either sign.
+    // Components that are zero or almost zero, of either sign, are replaced, so that the inverse is finite.
     let d = select(ray.d, vec3f(1.0e-20), abs(ray.d) < vec3f(1.0e-20));
     let inverse = 1.0 / d;
     let backwards = d < vec3f(0.0);
-    // Sixteen units in the last place.
+    // About sixteen units in the last place of f32.
     let slack = 1.0e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z) + reach);
     let against = select(vec3f(slack), vec3f(-slack), backwards);
     return Slabs(ray.o + against, ray.o - against, inverse, backwards);
@@ -50,11 +50,12 @@ fn box_entry(s: Slabs, low: vec3f, high: vec3f, t: f32) -> f32 {
     let leave = (select(high, low, s.backwards) - s.leave) * s.inverse;
     let near = fmax(fmax(enter.x, enter.y), fmax(enter.z, 0.0));
     let far = fmin(fmin(leave.x, leave.y), fmin(leave.z, t));
-    // Distances have errors of their own.
+    // The distances themselves have rounding errors.
     return select(MISSED, near, near * 0.99999 <= far);
 }
 
-// Where a walk is: a node, and for each level, the lowest bit its own, whether the sibling there is still to be visited.
+// Where a walk is: a node, and one bit for each level that says whether the sibling there is still to be visited. The lowest bit is for the
+// level of the node.
 struct Place {
     node: u32,
     siblings: u32,
@@ -72,7 +73,8 @@ fn onward(at: Place, entry_0: f32, entry_1: f32) -> Place {
     return Place(select(node, 0u, over), select(siblings, 0u, over));
 }
 
-// The nearer of two hits. Trees are walked in any order: of equals the one with the lower key comes first in the scene.
+// The nearer of two hits. If both are at the same distance, the lower key wins: its surface comes first in the scene, and a walk may find
+// the two in any order.
 fn keep_nearest(hit: Hit, found: Hit, item: u32) -> Hit {
     let take = found.t < hit.t || (found.t == hit.t && found.key < hit.key);
     return Hit(select(hit.t, found.t, take), select(hit.key, found.key, take));

@@ -5,32 +5,34 @@ use super::trips;
 use crate::settings::Settings;
 use crate::world::{World, WorldLight};
 
-/// Squared, the glances of a sample in a pixel that may see a light directly.
+/// The square of this is the number of glances of a sample, in a pixel that may see a light directly.
 pub(super) const GLANCES: u32 = 4;
 
-/// The same where they look by way of mirrors and glass alone, unless paths have two vertices at most: indirect light is noisier
-/// than the edges that they see. 4 were slower by 8 % on caustic and 3 % on three_materials, for as much noise or a little less.
+/// The same, in a pixel that sees lights only by way of mirrors and glass, if paths may have more than two vertices. Then indirect light
+/// is noisier than the edges that glances see. With 4, caustic was slower by 8 % and three_materials by 3 %, for as much noise or a
+/// little less.
 const CHAIN_GLANCES: u32 = 2;
 
 /// The most glances of a sample.
 pub(crate) const MAX_GLANCES: u32 = GLANCES * GLANCES;
 
-/// The last vertex at which they look for a light. A ball of glass takes two before it, and one more in a mirror three.
+/// The greatest number of the vertex at which glances look for a light. A ball of glass takes two vertices before it, and a second ball,
+/// seen in a mirror, takes three more.
 const LONGEST_GLANCE: u32 = 6;
 
-/// Where in a mark the vertex of glass stands at which one half of the glances is refracted and the other reflected.
+/// The first of the eight bits of a mark that hold the vertex of glass at which half of the glances are refracted and half reflected.
 pub(crate) const BRANCH_SHIFT: u32 = 8;
 
-/// Where in a mark it stands whether a light may be seen directly.
+/// The bit of a mark that says whether a light may be seen directly.
 pub(crate) const DIRECT_SHIFT: u32 = 16;
 
-/// Loop trips, of those that an older driver grants, that glances may use up.
+/// The most loop trips that glances may use, of those that an older driver grants: see [`trips`].
 const TRIPS_FOR_GLANCES: u64 = 16_384;
 
-/// The last vertex at which glances look for lights; 0: none are sent.
+/// The last vertex at which glances look for lights; 0 if none are sent.
 ///
-/// It does not depend on which light is kept, unless none of it can be seen: the parts of a picture are made of the same samples, and
-/// so add up to the whole.
+/// It does not depend on which parts of the light the picture keeps, unless glances can see none of them. So pictures of the parts are
+/// made of the same samples, and add up to the whole.
 pub(super) fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
     let eye = world.camera.eye;
     let faces_eye = |l: &WorldLight| l.normal.dot(eye) > l.offset;
@@ -46,7 +48,7 @@ pub(super) fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
         && !world.lights.is_empty()
         && world.primitives.len() + world.lights.len() <= BAKED_LIMIT;
     let sight = if access == Access::Tree {
-        // The host looks at all surfaces for what mirrors show, which would take too long.
+        // To find what mirrors show, the host tests all surfaces. Here that would take too long.
         1
     } else if shown {
         LONGEST_GLANCE
@@ -63,7 +65,7 @@ pub(super) fn sight(world: &World, settings: &Settings, access: Access) -> u32 {
     }
 }
 
-/// Squared, the glances of a sample in a pixel that sees lights by way of mirrors and glass alone.
+/// The square of this is the number of glances of a sample, in a pixel that sees lights only by way of mirrors and glass.
 pub(super) fn in_chains(settings: &Settings) -> u32 {
     if settings.max_depth > 2 {
         CHAIN_GLANCES

@@ -14,24 +14,25 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::ops::RangeInclusive;
 
-/// The most images among which a path chooses, for each has its weight at every diffuse vertex; the rest is left to chance.
+/// The most images among which a path chooses: every diffuse vertex computes the weight of each. Other images are left to chance.
 const MOST: usize = 8;
 
-/// Bits in which a path remembers the number of a surface, and those of a light.
+/// Bits in which a path remembers the number of a mirror. As many hold the number of a light.
 pub(super) const MIRROR_BITS: u32 = 15;
 
-/// How far lengths may differ for their fourth powers to stay in f32.
+/// Ratios of lengths whose fourth powers stay within the range of f32.
 const LIKE_LENGTHS: RangeInclusive<f64> = 1e-4..=1e4;
 
-/// Images weaker than this are left to chance: what they are multiplied with must not take them out of f32.
+/// Images weaker than this are left to chance: products with their weights might leave the range of f32.
 const LEAST_STRENGTH: f64 = 1e-20;
 
-/// One ball must have so many times the radius of a light, or none is worth the effort: at 1.1 a room lost a fifth of its speed
-/// for 6 % of its variance, at 1.5 a sixth for 22 %.
+/// No images are sought unless some ball has at least this many times the radius of a light that it shows. With a ratio of 1.1 a room
+/// lost a fifth of its speed for 6 % less variance; with 1.5, a sixth for 22 % less.
 const WORTH: f64 = 1.5;
 
-/// Where the images weigh w, the lights themselves v, and the images next to their balls e, a path is sent with probability
-/// w / (w + this (v + e)). With 1, 2, 4 and 8 the efficiency was the same up to the noise of its measurement.
+/// The weight of not being sent to an image. At a place where the images weigh w and the lights themselves v, a path is sent with
+/// probability w / (w + `BESIDE` (v + e)); e is the weight of the images right next to a ball. With 1, 2, 4 and 8 the efficiency was
+/// the same up to the noise of its measurement.
 const BESIDE: f64 = 4.0;
 
 /// 1 / the greatest probability with which a path is sent.
@@ -45,15 +46,15 @@ pub(super) struct Image {
     radius: f64,
     /// Index into [`World::lights`].
     light: usize,
-    /// About the light it gives to what is next to the ball.
+    /// An estimate of the light that it gives to a receiver right next to the ball.
     strength: f64,
 }
 
 /// The images that the kernel of a scene seeks.
 ///
-/// Only of lights that are farther from a ball than their own radius: then an image brings no more for a direction drawn
-/// than chance does. Light by way of a flat mirror could be sought in the same way; on a scene with three that lowered the
-/// variance by 8 %, and the speed by a quarter.
+/// Only lights that are farther from a ball than their own radius are sought in it. Then a direction drawn to the image brings no more
+/// light than a direction that leads there by chance. Light by way of a flat mirror could be sought in the same way. In a scene with
+/// three flat mirrors that lowered the variance by 8 %, and the speed by a quarter.
 pub(super) fn of(world: &World, settings: &Settings, access: Access) -> Vec<Image> {
     let uses = |wanted: fn(&Bsdf) -> bool| {
         let mut used = world
@@ -98,7 +99,7 @@ fn image(
         return None;
     };
     let distance = center.distance(l.center) - radius;
-    // How much of the ball lies before the light.
+    // How far the ball extends in front of the light's plane.
     let before = l.normal.dot(center) - l.offset + radius;
     let like = |a: f64, b: f64| LIKE_LENGTHS.contains(&(a / b));
     let worth = p.side == Side::Outside
@@ -119,10 +120,11 @@ fn image(
     })
 }
 
-/// The path loop with another around its vertex: after some turns all paths that are to be sent to an image are sent at once.
+/// The kernel with a second loop inside the path loop, around the vertex. After some turns of it, all paths that wait to be sent to an
+/// image are sent at once.
 ///
 /// # Panics
-/// If `wgsl` has no such loop.
+/// If `wgsl` has no path loop.
 pub(super) fn in_turns(wgsl: &str) -> String {
     const HEAD: &str = "    while film.s < film.end && trips_remain() {\n";
     const FOOT: &str = "\n    }\n    store_pixel(";
@@ -194,8 +196,8 @@ fn counts_light(trail: ImageTrail, light: u32) -> bool {{
     s
 }
 
-/// Chooses as `choose_light` does: all weights stay in registers, and the first partial sum above u times the whole chooses.
-/// What is left of the whole beyond all of them is the choice of none.
+/// `choose_image`, which works like an unrolled `choose_light`: all weights stay in registers, and the first image whose partial sum is
+/// above u times the whole is chosen. The whole is more than the sum of all weights. The rest of it stands for the choice of none.
 fn choice(images: &[Image]) -> String {
     let mut s = String::from(
         "fn choose_image(p: vec3f, n: vec3f, straight: f32, u: f32) -> ChosenImage {\n",
@@ -246,7 +248,7 @@ mod tests {
     use super::*;
     use crate::settings::Overrides;
 
-    /// A room with a mirror ball of this radius, 2 below a light of radius 0.2 and this radiance.
+    /// How many images are sought in a room with a mirror ball of this radius, 2 below a light of radius 0.2 and this radiance.
     fn sought(radius: f64, radiance: f64, overrides: &Overrides) -> usize {
         let text = format!(
             "[camera]\neye = [0, 1, 4]\nlook_at = [0, 1, 0]\nvfov = 40\nresolution = [8, 8]\n\

@@ -1,9 +1,9 @@
 //! Loop trips of old Mesa: the host's part.
 //!
-//! Mesa's llvmpipe lets the loops of an invocation go round 65 535 times in all, and then ends every loop in silence (seen with 22.3,
-//! not with 25.0). So kernels without trees get no more samples in a dispatch than [`Kernel::trips_per_sample`] allows, and kernels
-//! with trees count their trips: see `shaders/trips/`. Delete this file, `shaders/trips/counted.wgsl` and what they are called by when
-//! Mesa 22 is gone.
+//! Mesa's llvmpipe lets the loops of an invocation take 65 535 trips in all, and then silently ends every loop (seen with 22.3, not with
+//! 25.0). So kernels without trees get no more samples in a dispatch than [`Kernel::trips_per_sample`] allows, and kernels with trees
+//! count their trips: see `shaders/trips/`. Delete this file, `shaders/trips/counted.wgsl` and the code that calls them when Mesa 22 is
+//! gone.
 //!
 //! [`Kernel::trips_per_sample`]: super::Kernel::trips_per_sample
 
@@ -14,7 +14,7 @@ use super::trees::Parted;
 use crate::settings::Settings;
 use crate::world::{World, light_tree, visibility};
 
-/// The most loop trips that an invocation may take on this adapter. A driver without a version is taken for old.
+/// The most loop trips that an invocation may take on this adapter. A driver that names no version counts as old.
 pub(crate) fn limit(adapter: &str, driver: &str) -> u64 {
     let llvmpipe = adapter.to_lowercase().contains("llvmpipe");
     let mesa = driver
@@ -29,14 +29,14 @@ pub(crate) fn limit(adapter: &str, driver: &str) -> u64 {
     }
 }
 
-/// What is wrong where a path may take more trips than there are.
+/// The error message for a path that may take more trips than the driver grants.
 pub(crate) fn too_many(path: &str, trips: u64, advice: &str) -> String {
     format!(
         "{path} {trips} loop iterations{advice}, but this driver silently stops an invocation at 65535; lower max_depth or use --backend cpu"
     )
 }
 
-/// The loop trips that a vertex can take of an invocation; but for walks through the trees of `parted`, which count theirs.
+/// The most loop trips that a vertex can take, without walks through the trees of `parted`, which count their own.
 pub(super) fn at_vertex(
     world: &World,
     settings: &Settings,
@@ -47,13 +47,14 @@ pub(super) fn at_vertex(
     let (ray, choice) = match access {
         Access::Baked => (0, 0),
         Access::Buffers => (world.surface_count() as u64, world.lights.len() as u64),
-        // Surfaces without bounds, if they are many; down the light tree and up again.
+        // A loop over the surfaces outside the trees, if they are many. The light tree is walked down to choose a light, and up for the
+        // probability of one.
         Access::Tree => (
             parted.map_or(0, |p| p.apart.len() as u64),
             2 * u64::from(light_tree::levels(world.lights.len())),
         ),
     };
-    // Every vertex: nearest hit, and for each shadow ray a choice and a ray.
+    // A vertex finds the nearest hit. For each shadow ray it chooses a light and traces the ray.
     let shadow_rays = u64::from(settings.shadow_rays);
     let inner = ray + shadow_rays * (choice + ray);
     let shadow_loop = if shadow_rays > 1 { shadow_rays } else { 0 };
@@ -68,24 +69,24 @@ pub(super) fn at_vertex(
 /// The loop trips that the choice of a place in the pixel can take.
 const STRATA_LOOP: u64 = 32;
 
-/// Those that loading and storing a pixel's numbers takes: three, four and four.
+/// The loop trips that loading and storing a pixel's numbers takes: three, four and four.
 const LOOPS_AROUND: u64 = 11;
 
-/// The most that one sample can take; 0 where the kernel counts.
+/// The most loop trips that one sample can take; 0 if the kernel counts them itself.
 pub(super) fn per_sample(world: &World, settings: &Settings, features: &Features) -> u64 {
     if features.access == Access::Tree {
         return 0;
     }
-    // While one lane glances another may do all that a vertex asks for.
+    // Every glance counts as a whole vertex: while one lane sends a glance, another may go through all the loops of a vertex.
     let turns = u64::from(features.last_depth) + u64::from(MAX_GLANCES * features.sight);
     let trips = turns
         .saturating_mul(at_vertex(world, settings, features.access, None))
         .saturating_add(STRATA_LOOP + LOOPS_AROUND);
-    // The loop of vertices is inside another one where images are sought, which goes round no more often.
+    // If images are sought, the loop of vertices is inside another loop, which takes no more trips than the inner one.
     trips + if features.images { turns } else { 0 }
 }
 
-/// What a kernel that counts takes off before its first sample, and at each vertex.
+/// The loop trips that a kernel that counts subtracts before its first sample, and at each vertex.
 pub(super) fn counted(
     world: &World,
     settings: &Settings,

@@ -249,8 +249,8 @@ fn move_onto(
     }
 }
 
-/// Gives every face its identity. The number of a plane becomes the identity of the face that is met first in the plane. Curved
-/// faces have no number of a plane, but 0, and get an identity of their own.
+/// Gives every face its identity. The number of a plane becomes the identity of the face that is met first in the plane. A curved face
+/// lies in no plane: its number is 0, and it gets an identity of its own.
 pub(super) fn name(lights: &mut [WorldLight], primitives: &mut [WorldPrimitive]) {
     let mut names = HashMap::new();
     let first = lights.len();

@@ -6,9 +6,9 @@ use glam::DVec3;
 
 /// Whether a matt surface comes nearer to the rim of a light than the light's radius, in front of the light.
 ///
-/// Light sampling leaves the cosine out. So near a light the cosine varies much over it, and bounces that meet the light by chance
-/// are worth including with multiple importance sampling. On such scenes that divides the variance by 1.3 to 2.5, on others it
-/// gains nothing, and it costs 5 to 9 % of the time.
+/// The density of light sampling leaves out the cosine at the receiver, which varies strongly over a light that is near. There, bounces
+/// that meet the light by chance are worth including by multiple importance sampling. That divides the variance by 1.3 to 2.5 on such
+/// scenes, and gains nothing on others. It takes 5 to 9 % of the time.
 ///
 /// With too many pairs of surfaces and lights to look at, the answer is `true`.
 pub(crate) fn light_near_matt(world: &World) -> bool {
@@ -24,7 +24,8 @@ pub(crate) fn light_near_matt(world: &World) -> bool {
         .any(|p| world.lights.iter().any(|l| comes_near(p, l)))
 }
 
-/// Whether the surface comes this near to the light, by the distance from the light's centre minus the light's radius.
+/// Whether the surface comes that near to the rim. The distance to the rim is taken as the distance to the light's centre minus the
+/// light's radius.
 fn comes_near(p: &WorldPrimitive, l: &WorldLight) -> bool {
     let reach = 2.0 * l.radius;
     // What is in the light's plane or behind it gets none of its light.

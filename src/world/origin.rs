@@ -29,7 +29,7 @@ pub(super) fn choose_origin(scene: &Scene) -> DVec3 {
     }
     sized.sort_by(|a, b| a.1.total_cmp(&b.1));
     let median = sized[sized.len() / 2].1;
-    // Huge spheres that serve as walls are left out, for their centres are far away.
+    // Huge spheres that serve as walls are left out, because their centres are far away.
     let ordinary = sized
         .iter()
         .filter(|(_, r)| *r <= 10.0 * median)
@@ -208,7 +208,7 @@ mod tests {
         scene.lights[0].radius = 2e-14;
         scene.camera.eye.z = 300.0;
         let world = World::new(&scene, [8, 6]);
-        // The power of two next to √(2·10⁻¹⁴ · 300).
+        // The power of two nearest to √(2·10⁻¹⁴ · 300).
         assert_eq!(world.unit, (-19f64).exp2());
         assert_eq!(world.lights[0].radius * world.unit, 2e-14);
     }

@@ -6,8 +6,8 @@
 //! area heuristic split most nodes as it likes.
 //!
 //! The builder is our own. The crate `obvhs` had not finished after a minute with thirty thousand equal boxes, because it looks for
-//! pairs of boxes of which each is nearest to the other. The crate `bvh` brings its own linear algebra, and was not tried. Neither
-//! numbers nodes in this way.
+//! pairs of boxes that are nearest to each other. The crate `bvh` brings its own linear algebra, and was not tried. Neither numbers
+//! nodes in this way.
 
 use super::Geometry;
 use glam::DVec3;
@@ -372,7 +372,7 @@ mod tests {
                 let empty = |k: usize| tree.nodes[k] == Node::EMPTY;
                 for (i, n) in tree.nodes.iter().enumerate().skip(1) {
                     let below = 2 * i < tree.nodes.len() && !(empty(2 * i) && empty(2 * i + 1));
-                    // An inner node has two children, a leaf and an empty one none.
+                    // An inner node has two children. A leaf or an empty node has none.
                     assert_eq!(below, !empty(i) && n.item.is_none());
                     assert!(!below || !(empty(2 * i) || empty(2 * i + 1)));
                 }

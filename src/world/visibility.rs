@@ -39,8 +39,8 @@ fn hull_faces(world: &World) -> BTreeSet<u32> {
 /// Whether a surface can lie between a light and a point that a path reaches.
 fn can_block(world: &World, number: usize, hull: &BTreeSet<u32>) -> bool {
     let Some(p) = world.primitive(number) else {
-        // A light. Flush on a wall of the hull it blocks as little as the wall does. And if all lights lie in one plane, none can
-        // block another.
+        // A light. If it lies flush on a wall of the hull, it blocks as little as the wall does. And if all lights lie in one plane,
+        // none can block another.
         let face = world.lights[number].face;
         return !hull.contains(&face) && world.lights.iter().any(|l| l.face != face);
     };

@@ -1,7 +1,7 @@
-//! `surface_at`, `face_at`, `material_at` and `light_at` of kernels with the scene's values in their text.
+//! `surface_at`, `face_at`, `material_at` and `light_at`, for kernels with the scene's values in their text.
 //!
-//! They are chains of selections among literals: a load from a buffer at an index that differs from lane to lane costs a software
-//! adapter a trip through memory for every lane and word, which is most of a path's time.
+//! They are chains of selections among literals. If the index of a load from a buffer differs from lane to lane, a software adapter
+//! accesses memory separately for every lane and word, and that would take most of a path's time.
 
 use super::super::layout::{DiskLight, Material, ShapeKind, Surface};
 use crate::world::{World, face, key};
@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 /// Names and values of a struct's scalars.
 pub(in crate::kernel) type Scalars = Vec<(String, String)>;
 
-/// All four.
+/// All four functions.
 pub(in crate::kernel) fn generate(world: &World) -> String {
     let first = world.lights.len();
     let numbers = first..world.surface_count();
@@ -47,7 +47,7 @@ pub(in crate::kernel) fn generate(world: &World) -> String {
     .concat()
 }
 
-/// What `vertex_at` and materials read of a surface: not its faces, and of what is flat neither point nor radius.
+/// The fields of a surface that `vertex_at` and materials read. They read no faces, and no point or radius of a flat surface.
 fn surface(world: &World, number: usize) -> Scalars {
     let surface = Surface::of(world, number);
     let flat = [ShapeKind::Plane, ShapeKind::Disk]
@@ -68,7 +68,7 @@ fn surface(world: &World, number: usize) -> Scalars {
         .collect()
 }
 
-/// A face has its own identity, but for those that lie in the plane of an earlier one.
+/// `face_at`. A face has an identity of its own, unless it lies in the plane of an earlier one.
 fn faces(world: &World) -> String {
     let mut s =
         String::from("fn face_at(key: u32, s: Surface) -> u32 {\n    var face = key + 1u;\n");
@@ -84,8 +84,8 @@ fn faces(world: &World) -> String {
     s + "    return face;\n}\n\n"
 }
 
-/// A function that selects a struct of type `kind` by `index`: element k of `elements` where `index` is its number.
-/// What all elements have in common is set once; zeros need not be set.
+/// A function that returns a struct of type `kind`: the one of `elements` whose number is `index`. Fields that are equal in all elements
+/// are set once. Zeros are not set, because a variable starts as zero.
 pub(in crate::kernel) fn chain(
     head: &str,
     kind: &str,

@@ -1,4 +1,4 @@
-//! `choose_light` where a line of code for each light chooses among them, and `light_scale`.
+//! `choose_light` with a line of code for each light, `keeps`, and `light_scale`.
 
 use super::super::features::{Features, LightChoice};
 use super::super::layout::DiskLight;
@@ -7,14 +7,14 @@ use crate::settings::LightParts;
 use crate::world::World;
 use std::fmt::Write as _;
 
-/// Chooses one light with probability in proportion to its weight; nothing where a module of the shaders does.
+/// `choose_light`, which chooses one light with a probability in proportion to its weight. Empty if a module of the shaders has it.
 pub(in crate::kernel) fn choose(world: &World, features: &Features) -> String {
     const HEAD: &str = "fn choose_light(p: vec3f, to: Receiver, u: vec2f) -> Chosen {\n";
     match features.choice {
         LightChoice::Loop | LightChoice::Tree => String::new(),
         LightChoice::Only => {
             let light = DiskLight::of(&world.lights[0]).constructor();
-            // Images are chosen against the light's own weight.
+            // The choice of an image compares with the light's own weight.
             let weight = if features.images {
                 "light_weight(light, p, to)"
             } else {
@@ -29,7 +29,7 @@ pub(in crate::kernel) fn choose(world: &World, features: &Features) -> String {
             )
         }
         LightChoice::Unrolled => {
-            // All weights stay in registers; the first partial sum above u times the whole chooses.
+            // All weights stay in registers. The first light whose partial sum is above u times the whole is chosen.
             let mut s = String::from(HEAD);
             let mut before = String::new();
             for (i, l) in world.lights.iter().enumerate() {
@@ -69,7 +69,7 @@ pub(in crate::kernel) fn choose(world: &World, features: &Features) -> String {
     }
 }
 
-/// `keeps`: whether light is kept that was scattered so many times on its way to the eye.
+/// `keeps`: whether the picture keeps light that was scattered this many times on its way to the eye.
 pub(in crate::kernel) fn keeps(parts: LightParts) -> String {
     let kept = [
         (parts.emitted, "scatterings == 0u"),
@@ -85,7 +85,7 @@ pub(in crate::kernel) fn keeps(parts: LightParts) -> String {
     format!("fn keeps(scatterings: u32) -> bool {{\n    return {condition};\n}}\n\n")
 }
 
-/// See [`World::light_scales`]. Media that follow each other with one scale make one line.
+/// `light_scale`: see [`World::light_scales`]. Consecutive media with the same scale share a line.
 pub(in crate::kernel) fn scale(world: &World) -> String {
     let Some(scales) = &world.light_scales else {
         return "fn light_scale(medium: u32) -> f32 {\n    return 1.0;\n}\n\n".to_owned();

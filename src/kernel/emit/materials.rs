@@ -5,7 +5,7 @@ use super::super::features::Features;
 use crate::scene::MaterialKind;
 use std::fmt::Write as _;
 
-/// The two functions.
+/// `sample_bsdf`, and `evaluate_bsdf` if lights are sampled.
 pub(in crate::kernel) fn dispatch(features: &Features) -> String {
     let mut s = String::new();
     let all: Vec<MaterialKind> = features.materials().collect();
@@ -31,7 +31,7 @@ pub(in crate::kernel) fn dispatch(features: &Features) -> String {
     s
 }
 
-/// `is_NAME(material)` of every kind: false where the scene has none, true where it has no other.
+/// `is_NAME(material)` of every kind. It is constant if the scene has none of the kind, or no other.
 pub(in crate::kernel) fn predicates(features: &Features) -> String {
     let mut s = String::new();
     for kind in MaterialKind::ALL {
@@ -49,7 +49,7 @@ pub(in crate::kernel) fn predicates(features: &Features) -> String {
     s
 }
 
-/// A function that has each of these materials do its part.
+/// A function that returns the result of `VERB_NAME` for the material that was met, one of `kinds`.
 fn over(
     features: &Features,
     verb: &str,
@@ -67,7 +67,7 @@ fn over(
         ([only], _) => {
             let _ = writeln!(s, "    return {};", call(only));
         }
-        // Straight code: all of them, and a selection.
+        // Straight code: calls all of them and selects a result.
         ([first, rest @ ..], Access::Baked) => {
             let _ = writeln!(s, "    var r = {};", call(first));
             for kind in rest {

@@ -1,4 +1,4 @@
-//! WGSL that is generated for a scene: what meets its surfaces, chooses its lights, fetches its values, and dispatches over its
+//! WGSL that is generated for a scene: functions that intersect its surfaces, choose its lights, fetch its values, and dispatch over its
 //! materials.
 
 pub(super) mod fetch;

@@ -9,23 +9,23 @@ use crate::world::{Geometry, Side, World, WorldPrimitive, visibility};
 use glam::DVec3;
 use std::fmt::Write as _;
 
-/// A surface that a function of the shaders meets.
+/// A surface, and the function of the shaders that intersects it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::kernel) struct Target {
     /// Its number in the kernel: lights come first.
     pub number: usize,
-    /// The function. Consecutive surfaces with the same one make one loop.
+    /// The function. Consecutive surfaces with the same function share a loop.
     pub function: Function,
 }
 
-/// A function of the shaders that meets one shape: `SHAPE_VARIANT`.
+/// A function of the shaders that intersects one shape. Its name is `SHAPE_VARIANT`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Function {
     pub shape: ShapeKind,
     pub variant: Variant,
 }
 
-/// From where, and for which rays.
+/// On which side of the shape the rays are, and which rays they are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Variant {
     /// From either side: a disk.
@@ -59,13 +59,13 @@ impl Function {
         format!("{}_{variant}", self.shape.name())
     }
 
-    /// A call for the surface with key `key`, whose values `field` gives.
+    /// A call for the surface with key `key`. `field` gives the text of a field's value.
     pub fn call(self, hit: &str, field: impl Fn(&str) -> String, key: &str) -> String {
         let shape = self.shape.constructor(&field);
         self.call_with(hit, &shape, &field, key)
     }
 
-    /// The same with a struct of the shape that is there already.
+    /// The same, with the text of a struct of the shape that exists already.
     pub fn call_with(
         self,
         hit: &str,
@@ -87,14 +87,14 @@ impl Function {
     }
 }
 
-/// Both functions; `parted` is how the world is parted where there are trees.
+/// `intersect`, and `occluded` if lights are sampled. `parted` says which surfaces lie in trees, if there are trees.
 pub(in crate::kernel) fn generate(
     world: &World,
     features: &Features,
     parted: Option<&Parted>,
 ) -> String {
     let mut s = String::new();
-    // With trees the surfaces outside them are met as those of small scenes, if they are no more.
+    // Surfaces outside the trees are baked like those of a small scene, if there are no more of them than in a small scene.
     let (mut one_by_one, each) = match parted {
         Some(parted) if parted.apart.len() <= BAKED_LIMIT => (parted.apart.clone(), Access::Baked),
         Some(parted) => (parted.apart.clone(), Access::Buffers),
@@ -168,7 +168,7 @@ fn function(p: &WorldPrimitive) -> Function {
     Function { shape, variant }
 }
 
-/// The function that answers for a shadow ray, which needs no distance, what `target.function` answers for others.
+/// The function that takes the place of `target.function` for shadow rays, which need no distance.
 pub(in crate::kernel) fn for_shadows(world: &World, target: &Target) -> Function {
     let f = target.function;
     let round = matches!(f.shape, ShapeKind::Sphere | ShapeKind::Cylinder);
@@ -185,7 +185,7 @@ pub(in crate::kernel) fn for_shadows(world: &World, target: &Target) -> Function
     Function { variant, ..f }
 }
 
-/// Calls that make `hit` the nearest of itself and `list`.
+/// Calls that set `hit` to the nearest of itself and the hits of `list`. For the `nearest` hit, planes that face each other share a call.
 fn calls(s: &mut String, world: &World, list: &[Target], access: Access, nearest: bool) {
     match access {
         Access::Baked => {
@@ -221,7 +221,7 @@ fn calls(s: &mut String, world: &World, list: &[Target], access: Access, nearest
     }
 }
 
-/// The plane that an opaque plane's normal and offset describe.
+/// Normal and offset of an opaque plane; `None` for any other surface.
 fn opaque_plane(world: &World, t: &Target) -> Option<(DVec3, f64)> {
     match world.primitive(t.number)?.geometry {
         Geometry::Plane { normal, offset } if t.function.variant == Variant::Front => {
@@ -231,7 +231,7 @@ fn opaque_plane(world: &World, t: &Target) -> Option<(DVec3, f64)> {
     }
 }
 
-/// An opaque plane later in the list that faces plane `k` and coincides with nothing.
+/// The first opaque plane later in the list that faces plane `k`.
 fn facing_plane(world: &World, list: &[Target], k: usize) -> Option<usize> {
     let (normal, offset) = opaque_plane(world, &list[k])?;
     let later = list.iter().enumerate().skip(k + 1);
@@ -241,7 +241,7 @@ fn facing_plane(world: &World, list: &[Target], k: usize) -> Option<usize> {
     later.filter(|(_, t)| faces(t)).map(|(m, _)| m).next()
 }
 
-/// Whether the last component that is not 0 is positive: true of one of a normal and its opposite.
+/// Whether the last component that is not 0 is positive. This is true for exactly one of a normal and its opposite.
 fn points_up(normal: DVec3) -> bool {
     let [x, y, z] = normal.to_array();
     [z, y, x]
@@ -266,7 +266,7 @@ fn pair_call(world: &World, a: &Target, b: &Target) -> String {
 fn baked_call(world: &World, t: &Target) -> String {
     let mut surface = Surface::of(world, t.number);
     if t.function.shape == ShapeKind::Disk && !points_up(surface.axis.map(f64::from).into()) {
-        // A disk is two-sided: which way its normal points is no matter, and one way makes equal quotients.
+        // A disk is two-sided, so its normal may be turned. If all normals point the same way, parallel disks share their quotients.
         surface.axis = surface.axis.map(|x| -x);
         surface.offset = -surface.offset;
     }

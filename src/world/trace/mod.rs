@@ -74,8 +74,8 @@ pub struct Hit {
 }
 
 impl World {
-    /// The nearest thing that the ray meets. Of several at one distance it is the first in this order: the lights, then the
-    /// primitives, as they stand in the world.
+    /// The nearest thing that the ray meets. If several are at the same distance, it is the first of them: lights come before
+    /// primitives, and each kind is in the order of the world.
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
         let nearer = |t: f64, nearest: &Option<Hit>| nearest.as_ref().is_none_or(|n| t < n.t);
