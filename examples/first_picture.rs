@@ -21,8 +21,7 @@ fn main() -> Result<(), Error> {
     let path = std::env::temp_dir().join("first_picture.png");
     picture.save(&path)?;
     let device = &picture.provenance().devices[0].device.name;
-    let error = picture.relative_error().unwrap_or(f64::NAN);
     println!("{} on {device}", path.display());
-    println!("relative error {:.1} %", 100.0 * error);
+    println!("relative error {}", picture.relative_error());
     Ok(())
 }

@@ -36,6 +36,7 @@ pub mod scene;
 pub use engine::{Counters, DeviceInfo};
 pub use files::FileError;
 pub use film::coverage::Rect;
+pub use film::error::{Doubt, RelativeError};
 pub use film::{Estimate, Film};
 pub use glam::DVec3;
 pub use provenance::{DeviceUse, Provenance};

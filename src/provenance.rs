@@ -4,6 +4,7 @@ pub mod hash;
 
 use crate::engine::{Counters, DeviceInfo};
 use crate::film::Film;
+use crate::film::error::RelativeError;
 
 use crate::scene::{Canonical, Scene};
 use crate::settings::{Integrator, LightParts, Settings};
@@ -43,6 +44,15 @@ pub struct Provenance {
     pub counters: Counters,
     /// The picture's [relative error](Film::relative_error), where it is known.
     pub relative_error: Option<f64>,
+    /// Its standard error.
+    #[serde(default)]
+    pub relative_error_uncertainty: Option<f64>,
+    /// Why the true error may be far larger, in words.
+    #[serde(default)]
+    pub relative_error_doubt: Option<String>,
+    /// Whether the picture is black by construction ([`Settings::is_black`]).
+    #[serde(default)]
+    pub black: bool,
 }
 
 /// A device's share of the work.
@@ -78,6 +88,9 @@ impl Provenance {
             seconds: 0.0,
             counters: Counters::default(),
             relative_error: None,
+            relative_error_uncertainty: None,
+            relative_error_doubt: None,
+            black: settings.is_black(scene.scene()),
         }
     }
 
@@ -96,7 +109,15 @@ impl Provenance {
     pub fn describe(&mut self, film: &Film) {
         self.samples = film.coverage.mean();
         self.replicates = film.replicates().0;
-        self.relative_error = film.relative_error();
+        let error = self.error(film);
+        self.relative_error = error.value;
+        self.relative_error_uncertainty = error.uncertainty;
+        self.relative_error_doubt = error.doubt.map(|d| d.to_string());
+    }
+
+    /// The relative error of its film: zero if the picture is black, and is so by construction.
+    pub fn error(&self, film: &Film) -> RelativeError {
+        film.relative_error().of_black(self.black)
     }
 
     /// Adds the work of a film that is merged into this one. Call [`describe`](Self::describe) for the sum afterwards.
@@ -245,6 +266,9 @@ pub(crate) mod tests {
             seconds: 0.0,
             counters: Counters::default(),
             relative_error: None,
+            relative_error_uncertainty: None,
+            relative_error_doubt: None,
+            black: false,
         };
         p.add_work(&device("llvmpipe"), counters(12), 1.5);
         p

@@ -7,6 +7,7 @@
 
 use crate::engine::{Counters, Engine, EngineError, MAX_TILE_PIXELS, Part};
 use crate::film::coverage::{Coverage, Rect};
+use crate::film::error::RelativeError;
 use crate::film::{BLOCK, Film, REPLICATES};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -39,8 +40,10 @@ pub struct Job {
     pub round: u64,
     /// Stop after this long in the engine.
     pub time: Option<Duration>,
-    /// Stop when the relative error ([`Film::cautious_error`]) is at most this.
+    /// Stop when the relative error ([`Film::relative_error`]) is at most this, and not in doubt.
     pub error: Option<f64>,
+    /// Whether the picture is black by construction.
+    pub black: bool,
     /// How long a call to the engine should take at most, usually [`CALL`].
     pub call: Duration,
     /// The engine's seed, for an adaptive run. Its pilots use another seed. `samples` then starts at 0 and ends at the mean
@@ -72,8 +75,8 @@ pub struct Tally {
     pub samples: f64,
     /// Whether every pixel has at least one sample of the job.
     pub complete: bool,
-    /// If the error can end the run: [`Film::cautious_error`] at the last check, and the samples per pixel at that time.
-    pub error: Option<(u64, f64)>,
+    /// If the error can end the run: the error at the last check, and the samples per pixel at that time.
+    pub error: Option<(u64, RelativeError)>,
     /// The expected end, by the stop condition that will be met first; `None` while it is unknown.
     pub forecast: Option<Forecast>,
 }
@@ -314,11 +317,9 @@ impl<'a> Run<'a> {
         let Some(wanted) = self.job.error else {
             return false;
         };
-        let Some(error) = self.film.cautious_error() else {
-            return false;
-        };
+        let error = self.film.relative_error().of_black(self.job.black);
         self.tally.error = Some((count, error));
-        error <= wanted
+        error.upper().is_some_and(|e| e <= wanted)
     }
 
     /// See [`Tally::forecast`].
@@ -332,7 +333,11 @@ impl<'a> Run<'a> {
             // The time can't end the run before every pixel has a sample.
             needed = needed.min(in_time.max(1.0));
         }
-        match (job.error, self.tally.error) {
+        let known = self
+            .tally
+            .error
+            .and_then(|(count, e)| Some((count, e.upper()?)));
+        match (job.error, known) {
             // The error falls with the square root of the samples. The run ends at the first check after that.
             (Some(target), Some((count, error))) => {
                 let reached = count as f64 * (error / target).powi(2);

@@ -1,6 +1,6 @@
 //! The render settings: flags override the scene file, which overrides the defaults.
 
-use crate::scene::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Scene};
+use crate::scene::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Primitive, Scene};
 use serde::{Deserialize, Serialize};
 
 /// How light travels.
@@ -97,6 +97,28 @@ impl Settings {
             light: flags.light.unwrap_or(LightParts::ALL),
             integrator: flags.integrator.unwrap_or(Integrator::Path),
         }
+    }
+
+    /// Whether paths go on from surfaces to look for light. Otherwise all light but that of lamps, mirrors and glass comes from
+    /// light samples.
+    pub fn finds_light_by_chance(&self) -> bool {
+        self.integrator == Integrator::Path && self.light.indirect && self.max_depth > 2
+    }
+
+    /// Whether light can arrive that has been scattered by a surface.
+    fn keeps_scattered(&self) -> bool {
+        (self.light.direct && self.max_depth > 1) || (self.light.indirect && self.max_depth > 2)
+    }
+
+    /// Whether a picture of `scene` is black by construction: no light shines, or none of the light to be kept can arrive.
+    pub fn is_black(&self, scene: &Scene) -> bool {
+        let shines = scene.lights.iter().any(|l| l.radiance.max_element() > 0.0);
+        let scatters = |p: &Primitive| {
+            let bsdf = scene.materials[p.material].bsdf;
+            bsdf.is_dielectric() || bsdf.colors().iter().any(|c| c.max_element() > 0.0)
+        };
+        let scattered = self.keeps_scattered() && scene.primitives.iter().any(scatters);
+        !shines || !(self.light.emitted || scattered)
     }
 
     /// Samples in one round, which visits every stratum once.

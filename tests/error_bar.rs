@@ -111,6 +111,7 @@ fn adaptive() {
             round: settings.round(),
             time: None,
             error: None,
+            black: false,
             call: CALL,
             adaptive: Some(seed),
         };

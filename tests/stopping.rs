@@ -51,6 +51,7 @@ fn stopped(case: &Case, scene: &Scene, seed: u32) -> Film {
         round: settings.round(),
         time: None,
         error: Some(case.target),
+        black: false,
         call: CALL,
         adaptive: None,
     };
@@ -94,7 +95,7 @@ fn stopped_early(case: &Case, runs: u32) -> usize {
     for seed in 1..=runs {
         let film = stopped(case, &scene, seed);
         samples.push(film.coverage.samples().0);
-        stated += film.relative_error().expect("four replicates") / f64::from(runs);
+        stated += film.relative_error().value.expect("four replicates") / f64::from(runs);
         errors.push(true_error(&film, &reference));
     }
     errors.sort_by(f64::total_cmp);
@@ -115,7 +116,7 @@ fn stopped_early(case: &Case, runs: u32) -> usize {
         stated * 100.0,
         samples[0],
         samples[samples.len() - 1],
-        long.relative_error().expect("four replicates") * 100.0,
+        long.relative_error().value.expect("four replicates") * 100.0,
     );
     early
 }

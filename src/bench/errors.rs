@@ -40,6 +40,8 @@ pub struct Errors {
     pub claimed_mse: Option<f64>,
     /// [`Film::relative_error`].
     pub claimed_relative_error: Option<f64>,
+    /// Its stated uncertainty.
+    pub claimed_uncertainty: Option<f64>,
 }
 
 impl Truth {
@@ -115,13 +117,15 @@ impl Truth {
         relative.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let worst = ((TRIMMED * n).ceil() as usize).min(relative.len() - 1);
         let flip_map = flip::flip(self.size, &self.rgb, &rgb, flip::PIXELS_PER_DEGREE);
+        let error = film.relative_error();
         Errors {
             mse: (0..rgb.len()).map(square).sum::<f64>() / (3.0 * n),
             relative_mse,
             trimmed_relative_mse: kept(&relative[..relative.len() - worst]),
             flip: flip_map.iter().map(|f| f64::from(*f)).sum::<f64>() / n,
             claimed_mse: known.then_some(claimed / (3.0 * n)),
-            claimed_relative_error: film.relative_error(),
+            claimed_relative_error: error.value,
+            claimed_uncertainty: error.uncertainty,
         }
     }
 }

@@ -131,6 +131,7 @@ pub fn measure(
                 round: settings.round(),
                 time: None,
                 error: None,
+                black: false,
                 call: CALL,
                 adaptive: None,
             };
@@ -154,7 +155,11 @@ pub fn measure(
             rays,
             samples,
             seconds: (!over).then_some(seconds),
-            relative_error: if over { None } else { film.relative_error() },
+            relative_error: if over {
+                None
+            } else {
+                film.relative_error().value
+            },
         });
     }
     Ok(true)

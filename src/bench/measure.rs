@@ -145,6 +145,7 @@ fn picture(
         round: settings.round(),
         time: None,
         error: None,
+        black: false,
         call: CALL,
         adaptive: None,
     };

@@ -59,6 +59,7 @@ pub enum Record<'a> {
         flip: f64,
         claimed_mse: Option<f64>,
         claimed_relative_error: Option<f64>,
+        claimed_uncertainty: Option<f64>,
     },
     Point(Box<PointRecord<'a>>),
     ReportTable(&'a Cell),
@@ -110,6 +111,7 @@ pub struct PointRecord<'a> {
     pub flip: Spread,
     pub true_relative_error: Option<Spread>,
     pub claimed_relative_error: Option<Spread>,
+    pub claimed_uncertainty: Option<Spread>,
     pub efficiency: Option<Spread>,
     pub ratio: Option<Spread>,
 }
@@ -263,6 +265,7 @@ fn picture<'a>(r: &'a Results, m: &Measurement) -> Record<'a> {
         flip: m.errors.flip,
         claimed_mse: m.errors.claimed_mse,
         claimed_relative_error: m.errors.claimed_relative_error,
+        claimed_uncertainty: m.errors.claimed_uncertainty,
     }
 }
 
@@ -288,6 +291,7 @@ fn point<'a>(r: &'a Results, p: &Point) -> Record<'a> {
         flip: p.flip,
         true_relative_error: p.true_relative_error,
         claimed_relative_error: p.claimed_relative_error,
+        claimed_uncertainty: p.claimed_uncertainty,
         efficiency: p.efficiency,
         ratio: p.ratio,
     }))

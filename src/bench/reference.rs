@@ -112,6 +112,7 @@ pub fn make(
             round: settings.round(),
             time: None,
             error: None,
+            black: false,
             call: CALL,
             adaptive: None,
         };

@@ -73,9 +73,10 @@ pub struct Point {
     pub flip: Spread,
     /// √ of the relative MSE; `None` where it is not positive for some seed.
     pub true_relative_error: Option<Spread>,
-    /// The relative error that the pictures state. If the light comes from rare bright samples, it is smaller: a pixel with
-    /// such a sample states a large error, but also too large a luminance. The claimed MSE has no such weights.
+    /// The relative error that the pictures state.
     pub claimed_relative_error: Option<Spread>,
+    /// Its standard error, as the pictures state it.
+    pub claimed_uncertainty: Option<Spread>,
     /// 1 / (mean MSE × mean seconds), with the spread of single seeds; `None` where the MSE is not positive.
     pub efficiency: Option<Spread>,
     /// Efficiency over that of the first engine, at the same samples or at the most it had; the spreads of both in
@@ -152,6 +153,7 @@ fn point(group: &[&Measurement]) -> Option<Point> {
         flip: spread(&|m| m.errors.flip)?,
         true_relative_error: positive(&|m| above_0(m.errors.relative_mse).map(f64::sqrt)),
         claimed_relative_error: positive(&|m| m.errors.claimed_relative_error),
+        claimed_uncertainty: positive(&|m| m.errors.claimed_uncertainty),
         efficiency: above_0(mse.mean * seconds.mean).map(|product| Spread {
             mean: 1.0 / product,
             sd: single.and_then(|s| s.sd),
@@ -225,6 +227,7 @@ mod tests {
                 flip: 0.1,
                 claimed_mse: None,
                 claimed_relative_error: (samples > 4).then_some(0.5),
+                claimed_uncertainty: (samples > 4).then_some(0.1),
             },
         }
     }

@@ -2,7 +2,7 @@
 
 use super::args::{Backend, RenderArgs};
 use super::failure::Failure;
-use super::progress::{clock, percent};
+use super::progress::clock;
 use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
@@ -10,6 +10,7 @@ use crate::render::plan::end_for;
 use crate::render::{DEFAULT_SPP, MAX_SAMPLES};
 use crate::scene::Scene;
 use crate::settings::Settings;
+use crate::stats::percent;
 use std::ops::Range;
 use std::path::Path;
 

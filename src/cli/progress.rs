@@ -2,6 +2,7 @@
 
 use super::args::{ProgressStyle, Talk};
 use crate::film::Film;
+use crate::film::error::RelativeError;
 use crate::run::Tally;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle as BarStyle};
 use std::io::IsTerminal;
@@ -55,6 +56,12 @@ impl Progress {
         Self { shown, looks }
     }
 
+    /// The same, of a picture that may be black by construction.
+    pub fn of_black(mut self, black: bool) -> Self {
+        self.looks.black = black;
+        self
+    }
+
     /// Shows the progress of a render.
     pub fn show(&mut self, film: &Film, tally: &Tally) {
         match &mut self.shown {
@@ -62,13 +69,13 @@ impl Progress {
             Shown::Lines(last) if last.elapsed() < LINE_EVERY => {}
             Shown::Lines(last) => {
                 *last = Instant::now();
-                super::say!("{}", describe(tally, self.looks.error(film, tally)));
+                super::say!("{}", line(tally, self.looks.error(film, tally)));
             }
             Shown::Bar(bar) => {
                 let fraction = tally.forecast.map_or(0.0, |f| f.fraction);
                 let done = (fraction * STEPS as f64) as u64;
                 bar.set_position(done.min(STEPS - 1));
-                bar.set_message(describe(tally, self.looks.error(film, tally)));
+                bar.set_message(line(tally, self.looks.error(film, tally)));
             }
         }
     }
@@ -136,13 +143,14 @@ impl Drop for Progress {
 /// The picture's relative error when it was last computed.
 #[derive(Default)]
 struct Looks {
+    black: bool,
     last: Option<Look>,
 }
 
 struct Look {
     /// Samples per pixel at that time.
     samples: f64,
-    error: Option<f64>,
+    error: RelativeError,
     /// When the computation was done, and how long it took.
     done: Instant,
     took: Duration,
@@ -158,7 +166,7 @@ impl Looks {
         let due = |l: &Look| l.done.elapsed() >= l.took * LOOK_SHARE;
         if self.last.as_ref().is_none_or(due) {
             let begun = Instant::now();
-            let error = film.relative_error();
+            let error = film.relative_error().of_black(self.black);
             self.last = Some(Look {
                 samples: tally.samples,
                 error,
@@ -167,20 +175,28 @@ impl Looks {
             });
         }
         let look = self.last.as_ref()?;
-        let error = look.error?;
-        if tally.samples > look.samples {
-            // The error falls with the square root of the number of samples.
-            return Some(format!(
-                "about {}",
-                percent(error * (look.samples / tally.samples).sqrt())
-            ));
-        }
-        Some(percent(error))
+        // The error falls with the square root of the number of samples.
+        let since = (look.samples / tally.samples).sqrt().min(1.0);
+        let scaled = |x: f64| x * since;
+        describe(&RelativeError {
+            value: look.error.value.map(scaled),
+            uncertainty: look.error.uncertainty.map(scaled),
+            ..look.error
+        })
+    }
+}
+
+/// A relative error as text, with its uncertainty; `None` while nothing is known.
+pub fn describe(error: &RelativeError) -> Option<String> {
+    match (error.value, error.doubt) {
+        (None, None) => None,
+        (None, Some(doubt)) => Some(doubt.to_string()),
+        (Some(_), _) => Some(format!("relative error {error}")),
     }
 }
 
 /// One line: samples, percentage, time left, error. Never says 100 %.
-fn describe(tally: &Tally, error: Option<String>) -> String {
+fn line(tally: &Tally, error: Option<String>) -> String {
     let mut text = if tally.samples < 10.0 {
         format!("{:.1} samples", (tally.samples * 10.0).floor() / 10.0)
     } else {
@@ -191,19 +207,9 @@ fn describe(tally: &Tally, error: Option<String>) -> String {
         text += &format!(", {} left", clock(f.left));
     }
     if let Some(error) = error {
-        text += &format!(", relative error {error}");
+        text += &format!(", {error}");
     }
     text
-}
-
-/// A percentage with three digits.
-pub fn percent(share: f64) -> String {
-    let p = share * 100.0;
-    if p == 0.0 {
-        return "0 %".to_owned();
-    }
-    let digits = (2.0 - p.abs().log10().floor()).clamp(1.0, 12.0) as usize;
-    format!("{p:.digits$} %")
 }
 
 /// A duration as text: 4.2 s, 42 s, 3 min 20 s, 2 h 5 min.
@@ -222,6 +228,7 @@ mod tests {
     use super::*;
     use crate::film::coverage::Rect;
     use crate::run::Forecast;
+    use crate::stats::percent;
 
     #[test]
     fn a_progress_line_never_says_100_percent() {
@@ -234,10 +241,10 @@ mod tests {
             ..Tally::default()
         };
         assert_eq!(
-            describe(&tally, Some("1.23 %".into())),
+            line(&tally, Some("relative error 1.23 %".into())),
             "255 samples, 99 %, 0.0 s left, relative error 1.23 %"
         );
-        assert_eq!(describe(&Tally::default(), None), "0.0 samples");
+        assert_eq!(line(&Tally::default(), None), "0.0 samples");
     }
 
     /// The error is extrapolated while computing it is expensive, and computed again as soon as it is cheap.
@@ -251,9 +258,14 @@ mod tests {
             ..Tally::default()
         };
         let looked = |took| Looks {
+            black: false,
             last: Some(Look {
                 samples: 64.0,
-                error: Some(0.2),
+                error: RelativeError {
+                    value: Some(0.2),
+                    uncertainty: Some(0.02),
+                    doubt: None,
+                },
                 done: Instant::now(),
                 took,
             }),
@@ -266,9 +278,13 @@ mod tests {
         );
         tally.complete = true;
         let between = looked(hour).error(&film, &tally);
-        assert_eq!(between.as_deref(), Some("about 10.0 %"));
+        assert_eq!(
+            between.as_deref(),
+            Some("relative error 10.0 % \u{b1} 1.0 %")
+        );
         for mut looks in [looked(Duration::ZERO), Looks::default()] {
-            assert_eq!(looks.error(&film, &tally).as_deref(), Some("0 %"));
+            let error = looks.error(&film, &tally);
+            assert_eq!(error.as_deref(), Some("relative error 0 %"));
         }
     }
 

@@ -4,7 +4,7 @@ use super::args::{Backend, RenderArgs};
 use super::failure::Failure;
 use super::files::{Files, write_text};
 use super::plan;
-use super::progress::{Progress, clock, percent};
+use super::progress::{Progress, clock, describe};
 use super::saver::{Saver, longest_call};
 use super::say;
 use super::signals::Signals;
@@ -14,6 +14,7 @@ use crate::files::FileError;
 use crate::files::lock::Lock;
 use crate::film::Film;
 use crate::film::coverage::Rect;
+use crate::film::error::Doubt;
 use crate::film::pilot::Pilot;
 use crate::gpu::Making;
 use crate::kernel;
@@ -26,6 +27,7 @@ use crate::render::{self, memory};
 use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::{Canonical, Scene, check, parse};
 use crate::settings::Settings;
+use crate::stats::percent;
 use crate::world::World;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -113,6 +115,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         round: settings.round(),
         time: args.time,
         error: args.error,
+        black: provenance.black,
         call: longest_call(args),
         adaptive: args.adaptive.then_some(settings.seed),
     };
@@ -127,7 +130,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     // Render.
     let device = chosen.engine.device().clone();
     let mut saver = Saver::new(args, &provenance, &device);
-    let mut progress = Progress::new(&args.talk);
+    let mut progress = Progress::new(&args.talk).of_black(provenance.black);
     let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &signals.stop);
     let ended = run.go(|film, tally| {
         progress.show(film, tally);
@@ -180,7 +183,13 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     if !args.talk.quiet {
         say_end(&film, &provenance, &tally, reason, &written);
     }
-    warn(&settings, &tally.counters, &film, &provenance);
+    warn(
+        &settings,
+        &tally.counters,
+        &film,
+        &provenance,
+        args.talk.quiet,
+    );
     saved?;
     match reason {
         StopReason::Interrupted => Err(Failure::Interrupted {
@@ -350,8 +359,8 @@ fn say_end(
         let speed = tally.counters.paths as f64 / tally.seconds / 1e6;
         text += &format!(" ({speed:.3} million paths per second)");
     }
-    if let Some(error) = provenance.relative_error {
-        text += &format!(", relative error {}", percent(error));
+    if let Some(error) = describe(&provenance.error(film)) {
+        text += &format!(", {error}");
     }
     say!("{text}");
     say!("wrote {}", written.join(", "));
@@ -361,7 +370,13 @@ fn say_end(
 const CUT_SHARE: f64 = 1e-5;
 
 /// Warnings about the picture.
-fn warn(settings: &Settings, counters: &Counters, film: &Film, provenance: &Provenance) {
+fn warn(
+    settings: &Settings,
+    counters: &Counters,
+    film: &Film,
+    provenance: &Provenance,
+    quiet: bool,
+) {
     let share = counters.truncated as f64 / counters.paths.max(1) as f64;
     if share > CUT_SHARE && settings.max_depth_is_default {
         say!(
@@ -373,15 +388,19 @@ fn warn(settings: &Settings, counters: &Counters, film: &Film, provenance: &Prov
             settings.max_depth
         );
     }
-    if let Some(error) = provenance.relative_error
-        && film.heavy_tail().is_some_and(|tail| tail.unsafe_mean)
-    {
-        say!(
-            "warning: the true relative error may exceed the stated {}, often by 20 % or more: much of it comes from rare \
-             bright samples (such as light focused by glass or mirrors), few of which have been taken so far; take more samples \
-             (--spp, --time)",
-            percent(error)
-        );
+    // The report and the picture's header have it too.
+    let doubt = provenance.error(film).doubt.filter(|_| !quiet);
+    match doubt {
+        Some(Doubt::NoLight) => say!(
+            "warning: no light found yet: the picture is black, and its error is not known; take more samples (--spp, --time)"
+        ),
+        Some(doubt @ Doubt::Unlit(_)) => say!(
+            "warning: {doubt}, so the true relative error may be far above the stated one; take more samples (--spp, --time)"
+        ),
+        Some(doubt @ Doubt::Uncertain) => say!(
+            "warning: the stated relative error is uncertain: {doubt}; take more samples (--spp, --time)"
+        ),
+        None => {}
     }
     if let Some((x, y, sample)) = counters.first_nonfinite {
         say!(

@@ -85,6 +85,11 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
         }
     }
     into.left_out.merge(&other.left_out);
+    match (&mut into.reached, &other.reached) {
+        (Some(into), Some(other)) => into.merge(other),
+        (into @ None, other) => into.clone_from(other),
+        (Some(_), None) => {}
+    }
     // The pilots of one film say nothing about the sum.
     into.pilot = None;
     Ok(())

@@ -8,16 +8,18 @@
 //! blocks are added to f64 sums here. Neither boundary depends on how the work is cut.
 
 pub mod coverage;
-mod heavy_tail;
+pub mod error;
 mod left_out;
 pub mod merge;
 pub mod pilot;
+pub mod reached;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};
 pub use left_out::LeftOut;
 use pilot::Pilot;
 use rayon::prelude::*;
+use reached::Reached;
 use std::mem::take;
 use std::ops::Range;
 
@@ -49,6 +51,8 @@ pub struct Film {
     left_out: LeftOut,
     /// The pilots of an adaptive film (`--adaptive`).
     pub pilot: Option<Pilot>,
+    /// Where paths have met surfaces; `None` if nowhere, or if it is not known.
+    pub reached: Option<Reached>,
 }
 
 /// The estimate of a pixel.
@@ -77,6 +81,7 @@ impl Film {
             partial: Vec::new(),
             left_out: LeftOut::default(),
             pilot: None,
+            reached: None,
         }
     }
 
@@ -101,6 +106,7 @@ impl Film {
             partial,
             left_out: LeftOut::default(),
             pilot: None,
+            reached: None,
         }
     }
 
@@ -248,58 +254,6 @@ impl Film {
         }
     }
 
-    /// The picture's relative error, √ mean over pixels of s² / (Y² + (0.1 Ȳ)²), with s the standard error
-    /// of the luminance Y and Ȳ the picture's mean luminance; 0 for a black picture. Where a pixel has a single replicate,
-    /// s is the upper estimate by its samples' second moment. `None` while some pixel has fewer than two samples: nothing
-    /// is known then.
-    pub fn relative_error(&self) -> Option<f64> {
-        let (mut sum, mut n, mut known) = (0.0, 0u64, true);
-        self.for_each(|_, _, e| {
-            sum += luminance(e.mean);
-            n += 1;
-            known &= e.samples >= 2;
-        });
-        if n == 0 || !known {
-            return None;
-        }
-        let floor = 0.1 * sum / n as f64;
-        if floor == 0.0 {
-            return Some(0.0);
-        }
-        let mut ratio = 0.0;
-        self.for_each(|_, _, e| {
-            ratio += e.error[3].powi(2) / (luminance(e.mean).powi(2) + floor * floor);
-        });
-        Some((ratio / n as f64).sqrt())
-    }
-
-    /// The relative error that the stop condition uses. [`relative_error`](Self::relative_error) divides a pixel's error by
-    /// its luminance. If the light comes from rare bright samples, both depend on the same samples: a pixel with such a sample
-    /// has a large error, but also too large a luminance; a pixel without has a small error. Here each replicate's share of
-    /// s² is divided by the luminance of the *other* replicates. For small errors the result is the same; for large ones it is
-    /// too large rather than too small. `None` while some pixel has fewer than two replicates.
-    pub fn cautious_error(&self) -> Option<f64> {
-        if self.replicates().0 < 2 {
-            return None;
-        }
-        let floor = 0.1 * self.mean_luminance();
-        if floor == 0.0 {
-            return Some(0.0);
-        }
-        let (mut sum, mut pixels) = (0.0, 0u64);
-        for (rect, ranges) in self.coverage.cells() {
-            let counts = replicate_counts(ranges, self.strata);
-            for y in rect.y0..rect.y1 {
-                for x in rect.x0..rect.x1 {
-                    let counts = self.left_out.remaining(x, y, &counts);
-                    sum += cautious_square(&self.total(x, y), &counts, floor);
-                }
-            }
-            pixels += rect.area();
-        }
-        Some((sum / pixels as f64).sqrt())
-    }
-
     /// Mean luminance over the pixels that have samples; 0 if there are none.
     pub fn mean_luminance(&self) -> f64 {
         let (mut sum, mut n) = (0.0, 0u64);
@@ -376,22 +330,6 @@ fn estimate(sums: &[Sums<f64>; REPLICATES], counts: &[u64; REPLICATES]) -> Estim
         samples,
         replicates,
     }
-}
-
-/// Σ k_r (y_r - y)² / ((R - 1) n) / (y_-r² + floor²) over the R >= 2 replicates that have samples: y_r is the mean
-/// luminance of the k_r samples of replicate r, y that of all n, and y_-r that of those of the others.
-fn cautious_square(sums: &[Sums<f64>; REPLICATES], counts: &[u64; REPLICATES], floor: f64) -> f64 {
-    let light = sums.map(|s| luminance([s[0], s[1], s[2]]));
-    let all: f64 = light.iter().sum();
-    let n = counts.iter().sum::<u64>() as f64;
-    let replicates = counts.iter().filter(|&&k| k > 0).count() as f64;
-    let term = |(light, &k): (&f64, &u64)| {
-        let k = k as f64;
-        let others = (all - light) / (n - k);
-        k * (light / k - all / n).powi(2) / (others * others + floor * floor)
-    };
-    let with_samples = light.iter().zip(counts).filter(|(_, k)| **k > 0);
-    with_samples.map(term).sum::<f64>() / ((replicates - 1.0) * n)
 }
 
 /// How many of the sample numbers in `ranges` fall to each replicate.

@@ -7,8 +7,8 @@ use super::tile::{self, Tile};
 use super::work::{Work, coprime_stride, workgroups};
 use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
+use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::{BLOCK, Film};
 use crate::kernel::layout::Params;
 use crate::kernel::{Access, Kernel, compose, trips};
 use crate::settings::Settings;
@@ -42,6 +42,8 @@ pub struct GpuEngine {
     /// What the tile's textures hold since the last call, as it was read back.
     held: Option<Held>,
     seed: u32,
+    /// Whether its paths look for light by chance.
+    by_chance: bool,
     /// Seconds that one sample of one pixel takes, as measured so far.
     seconds_per_path: Option<f64>,
     compile_seconds: f64,
@@ -199,6 +201,7 @@ impl GpuEngine {
             marked: None,
             held: None,
             seed: settings.seed,
+            by_chance: settings.finds_light_by_chance(),
             seconds_per_path: None,
             compile_seconds: 0.0,
             read_back_seconds: 0.0,
@@ -477,15 +480,22 @@ impl Engine for GpuEngine {
         for part in parts {
             let Part { rect, samples } = part;
             counters.paths += part.paths();
-            let block = samples.start / BLOCK * BLOCK;
             let rows: Vec<_> = (rect.y0..rect.y1)
                 .into_par_iter()
-                .map(|y| count_row((rect.x0..rect.x1).map(|x| (x, y, counted[at(x, y)])), block))
+                .map(|y| {
+                    count_row(
+                        (rect.x0..rect.x1).map(|x| (x, y, counted[at(x, y)])),
+                        samples,
+                    )
+                })
                 .collect();
-            for (row, lost) in rows {
-                counters += row;
-                for (x, y, samples) in lost {
+            for row in rows {
+                counters += row.counters;
+                for (x, y, samples) in row.lost {
                     film.leave_out(x, y, samples);
+                }
+                if self.by_chance {
+                    row.reached.iter().for_each(|&(x, y)| film.reach(x, y));
                 }
             }
             film.put_block(*rect, samples.clone(), |x, y| held[at(x, y)]);

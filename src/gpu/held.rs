@@ -3,6 +3,7 @@
 use crate::engine::{Counters, Part};
 use crate::film::coverage::Rect;
 use crate::film::{BLOCK, Film, REPLICATES, Sums};
+use std::ops::Range;
 
 /// Running sums that lie in a tile's textures.
 pub(super) struct Held {
@@ -38,17 +39,35 @@ pub(super) fn continues_block(part: &Part) -> bool {
     !part.samples.start.is_multiple_of(BLOCK)
 }
 
-/// Unpacks the counters of some pixels, as `PixelFilm` of `shaders/film.wgsl` holds them, for a block that begins with sample number
-/// `block`. Returns their totals, and for each pixel that lost samples how many each replicate lost.
+/// What the counters of a row of pixels say.
+#[derive(Default)]
+pub(super) struct CountedRow {
+    /// Their totals.
+    pub counters: Counters,
+    /// Pixels that lost samples, and how many each replicate lost.
+    pub lost: Vec<(u32, u32, [u64; REPLICATES])>,
+    /// Pixels of which a path has gone on from a surface.
+    pub reached: Vec<(u32, u32)>,
+}
+
+/// Unpacks the counters of some pixels, as `PixelFilm` of `shaders/film.wgsl` holds them, for `samples` of one block.
 pub(super) fn count_row(
     pixels: impl Iterator<Item = (u32, u32, [u32; 4])>,
-    block: u64,
-) -> (Counters, Vec<(u32, u32, [u64; REPLICATES])>) {
-    let mut counters = Counters::default();
-    let mut lost = Vec::new();
+    samples: &Range<u64>,
+) -> CountedRow {
+    let block = samples.start / BLOCK * BLOCK;
+    let mut row = CountedRow::default();
+    let CountedRow {
+        counters,
+        lost,
+        reached,
+    } = &mut row;
     for (x, y, c) in pixels {
         let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
         counters.rays += u64::from(c[0]);
+        if u64::from(c[0]) > samples.end - samples.start {
+            reached.push((x, y));
+        }
         counters.truncated += half(1, 0);
         let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
         if left_out != [0; REPLICATES] {
@@ -58,5 +77,5 @@ pub(super) fn count_row(
             counters.first_nonfinite = counters.first_nonfinite.or(Some(first));
         }
     }
-    (counters, lost)
+    row
 }

@@ -43,6 +43,16 @@ pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
             "relative_error",
             p.relative_error.filter(|e| e.is_finite()).and_then(number),
         ),
+        (
+            "relative_error_uncertainty",
+            p.relative_error_uncertainty
+                .filter(|e| e.is_finite())
+                .and_then(number),
+        ),
+        (
+            "relative_error_doubt",
+            p.relative_error_doubt.as_deref().and_then(text),
+        ),
     ];
     all.into_iter()
         .filter_map(|(key, value)| Some((key, value?)))

@@ -6,7 +6,6 @@ use crate::files::atomic;
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::provenance::{Provenance, count_or_mean};
-use crate::stats::tail::Tail;
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::Path;
@@ -45,8 +44,10 @@ pub struct Report {
     pub rays_per_second: Option<f64>,
     /// Of the picture; null while nothing is known.
     pub relative_error: Option<f64>,
-    /// Of the numbers that the error is made of; null while nothing is known.
-    pub heavy_tail: Option<Tail>,
+    /// Standard error of `relative_error`.
+    pub relative_error_uncertainty: Option<f64>,
+    /// Why the true error may be far above `relative_error`, in words; null if there is no reason.
+    pub relative_error_doubt: Option<String>,
     /// Of the pixels that have samples; null if it is not finite.
     pub mean_luminance: f64,
     /// Paths of this run cut at max_depth.
@@ -99,6 +100,7 @@ impl Report {
             let seconds = run.seconds.render;
             (seconds > 0.0).then(|| count as f64 / seconds)
         };
+        let error = provenance.error(film);
         Self {
             version: provenance.version.clone(),
             scene: run.scene,
@@ -122,8 +124,9 @@ impl Report {
             rays: run.counters.rays,
             paths_per_second: rate(run.counters.paths),
             rays_per_second: rate(run.counters.rays),
-            relative_error: film.relative_error(),
-            heavy_tail: film.heavy_tail(),
+            relative_error: error.value,
+            relative_error_uncertainty: error.uncertainty,
+            relative_error_doubt: error.doubt.map(|d| d.to_string()),
             mean_luminance: film.mean_luminance(),
             truncated_paths: run.counters.truncated,
             nonfinite_samples: run.counters.nonfinite,
@@ -202,7 +205,8 @@ mod tests {
             "paths_per_second": 4.0,
             "rays_per_second": 10.0,
             "relative_error": 0.0,
-            "heavy_tail": null,
+            "relative_error_uncertainty": 0.0,
+            "relative_error_doubt": null,
             "mean_luminance": 0.5,
             "truncated_paths": 1,
             "nonfinite_samples": 0,
@@ -218,7 +222,7 @@ mod tests {
         let r = report(&film, 0.0);
         for key in [
             "relative_error",
-            "heavy_tail",
+            "relative_error_uncertainty",
             "mean_luminance",
             "paths_per_second",
             "rays_per_second",

@@ -17,6 +17,7 @@ use crate::files::atomic;
 use crate::files::{FileError, open};
 use crate::film::coverage::{Coverage, Rect};
 use crate::film::pilot::Pilot;
+use crate::film::reached::Reached;
 use crate::film::{BLOCK, Film, REPLICATES, Sums};
 use crate::provenance::Provenance;
 use crate::scene::LARGEST_STRATA;
@@ -48,6 +49,9 @@ struct Header {
     /// Rows of the array `left_out`.
     #[serde(default)]
     left_out: u64,
+    /// Whether there is an array `reached`.
+    #[serde(default)]
+    reached: bool,
     /// What steers an adaptive film; only there in one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pilot: Option<Pilot>,
@@ -76,6 +80,7 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         block: BLOCK,
         partial: unfinished,
         left_out: left_out.len() as u64,
+        reached: film.reached.is_some(),
         pilot: film.pilot.clone(),
         coverage: film.coverage.clone(),
         provenance: provenance.clone(),
@@ -128,6 +133,14 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
             descr: "<u8".into(),
             shape: vec![left_out.len() as u64, 2 + REPLICATES as u64],
             data: bytemuck::cast_slice(&left_out),
+        });
+    }
+    if let Some(reached) = &film.reached {
+        arrays.push(Array {
+            name: "reached",
+            descr: "|u1".into(),
+            shape: Reached::shape(film.size).map(u64::from).to_vec(),
+            data: reached.blocks(),
         });
     }
     atomic::replace(path, |file| npz::write(file, &arrays))
@@ -221,6 +234,14 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     } else {
         Vec::new()
     };
+    let reached = if header.reached {
+        let shape = Reached::shape(header.size).map(u64::from);
+        let blocks = reader.array("reached", "|u1", &shape, shape[0] * shape[1])?;
+        let reached = Reached::from_blocks(header.size, blocks);
+        Some(reached.ok_or_else(|| Damage::Wrong("\"reached\" holds more than 0 and 1".into()))?)
+    } else {
+        None
+    };
     reader.finish()?;
 
     // Only now is it certain that the file is as large as its bounds require.
@@ -251,6 +272,7 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
         partial,
     );
     film.pilot = header.pilot;
+    film.reached = reached;
     for [x, y, samples @ ..] in left_out {
         film.leave_out(x as u32, y as u32, samples);
     }

@@ -136,6 +136,7 @@ impl Engine for CpuEngine {
                 .collect()
         };
         let all: Option<Vec<_>> = parts.iter().map(render).collect();
+        let by_chance = self.tracer.settings().finds_light_by_chance();
         let mut total = Counters::default();
         for (Part { rect, samples }, pixels) in parts.iter().zip(all.ok_or(EngineError::Stopped)?) {
             let sums = pixels.iter().map(|p| p.sums).collect();
@@ -143,6 +144,9 @@ impl Engine for CpuEngine {
             for (k, pixel) in (0..).zip(pixels) {
                 let (x, y) = (rect.x0 + k % rect.width(), rect.y0 + k / rect.width());
                 film.leave_out(x, y, pixel.left_out);
+                if by_chance && pixel.counters.rays > pixel.counters.paths {
+                    film.reach(x, y);
+                }
                 total += pixel.counters;
             }
         }

@@ -271,6 +271,7 @@ fn render(
         round: provenance.settings.round(),
         time: None,
         error: None,
+        black: false,
         call: run::CALL,
         adaptive: None,
     };

@@ -13,6 +13,7 @@ use crate::engine::{DeviceInfo, EngineError};
 use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::Rect;
+use crate::film::error::RelativeError;
 use crate::film::pilot::Pilot;
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason, Tally};
@@ -200,6 +201,7 @@ impl Options {
 pub struct Progress<'a> {
     film: &'a Film,
     tally: &'a Tally,
+    black: bool,
 }
 
 impl Progress<'_> {
@@ -223,9 +225,9 @@ impl Progress<'_> {
         self.tally.forecast.map(|f| f.left)
     }
 
-    /// The picture's relative error so far; `None` while some pixel has fewer than two samples. Takes a look at every pixel.
-    pub fn relative_error(&self) -> Option<f64> {
-        self.film.relative_error()
+    /// The picture's relative error so far. This looks at every pixel.
+    pub fn relative_error(&self) -> RelativeError {
+        self.film.relative_error().of_black(self.black)
     }
 }
 
@@ -243,7 +245,7 @@ impl Progress<'_> {
 /// let options = Options { spp: Some(16), backend: Backend::Cpu, ..Options::default() };
 /// let picture = etendue::render(&scene, &options)?;
 /// assert_eq!(picture.size(), [16, 12]);
-/// assert!(picture.relative_error().is_some());
+/// assert!(picture.relative_error().value.is_some());
 /// # Ok::<(), etendue::Error>(())
 /// ```
 pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
@@ -278,15 +280,22 @@ pub fn render_with(
         round: settings.round(),
         time: options.time,
         error: options.error,
+        black: before.black,
         call: run::CALL,
         adaptive: options.adaptive.then_some(settings.seed),
     };
     let device = chosen.engine.device().clone();
     let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &options.stop);
     // What ends it besides the engine is `watch`, and that is no error.
-    let ended = run.go(|film, tally| match watch(&Progress { film, tally }) {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(None::<EngineError>),
+    let ended = run.go(|film, tally| {
+        match watch(&Progress {
+            film,
+            tally,
+            black: before.black,
+        }) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(None::<EngineError>),
+        }
     });
     let tally = run.tally;
     let ended = match ended {

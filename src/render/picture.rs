@@ -2,6 +2,7 @@
 
 use super::Error;
 use crate::compare::{self, Comparison, Limits, compare};
+use crate::film::error::RelativeError;
 use crate::film::{Estimate, Film};
 use crate::output::{Format, Pixels, store, write_png};
 use crate::provenance::Provenance;
@@ -69,9 +70,9 @@ impl Picture {
     }
 
     /// The picture's relative error, √ mean over pixels of s² / (Y² + (0.1 Ȳ)²), with s the standard error of the luminance Y
-    /// and Ȳ the picture's mean luminance; 0 for a black picture, `None` while some pixel has fewer than two samples.
-    pub fn relative_error(&self) -> Option<f64> {
-        self.provenance.relative_error
+    /// and Ȳ the picture's mean luminance; with its uncertainty, and with the reason if it is in doubt.
+    pub fn relative_error(&self) -> RelativeError {
+        self.provenance.error(&self.film)
     }
 
     /// What it was made from, by and on.

@@ -39,7 +39,12 @@ fn a_picture_says_what_it_shows_and_how_it_came_about() {
         (16.0, 16 * 192)
     );
     assert_eq!(provenance.devices[0].device.backend, "cpu");
-    assert!(picture.relative_error().is_some_and(|e| e > 0.0 && e < 1.0));
+    assert!(
+        picture
+            .relative_error()
+            .value
+            .is_some_and(|e| e > 0.0 && e < 1.0)
+    );
     // The plane in front is lit and not exactly known.
     let (pixel, error) = (picture.pixels()[16 * 11 + 8], picture.errors()[16 * 11 + 8]);
     assert!(pixel[0] > pixel[1] && pixel[1] > pixel[2] && pixel[2] > 0.0);

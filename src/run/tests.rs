@@ -122,6 +122,7 @@ fn job(size: [u32; 2], limit: u64, samples: Range<u64>) -> Job {
         round: 4,
         time: None,
         error: None,
+        black: false,
         call: CALL,
         adaptive: None,
     }
@@ -212,7 +213,7 @@ fn the_error_ends_a_run_at_the_same_sample_however_slow_the_machine() {
         let mut engine = Fake::new();
         engine.nap = Duration::from_millis(nap);
         assert_eq!(run(&job, &mut engine, &mut film), StopReason::Error);
-        assert!(film.relative_error().unwrap() <= 0.06);
+        assert!(film.relative_error().value.unwrap() <= 0.06);
         let (least, most) = film.coverage.samples();
         assert_eq!(least, most);
         assert!(least > 16 && least < 400, "{least}");

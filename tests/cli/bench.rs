@@ -170,6 +170,7 @@ fn json_lines_contain_all_measurements() {
         "flip",
         "true_relative_error",
         "claimed_relative_error",
+        "claimed_uncertainty",
         "efficiency",
         "ratio",
     ];

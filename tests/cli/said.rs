@@ -71,7 +71,7 @@ fn the_report_on_stdout_has_every_key() {
         .stderr("");
     let report: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
     for key in "version scene scene_hash adapter resolution regions seed spp stop_reason seconds paths rays \
-                paths_per_second rays_per_second relative_error heavy_tail mean_luminance truncated_paths nonfinite_samples"
+                paths_per_second rays_per_second relative_error relative_error_uncertainty relative_error_doubt mean_luminance truncated_paths nonfinite_samples"
         .split_whitespace()
     {
         assert!(report.get(key).is_some(), "no {key} in {report}");

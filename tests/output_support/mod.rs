@@ -54,6 +54,9 @@ pub fn provenance(size: [u32; 2]) -> Provenance {
         seconds: 0.0,
         counters: Counters::default(),
         relative_error: None,
+        relative_error_uncertainty: None,
+        relative_error_doubt: None,
+        black: false,
     };
     let device = DeviceInfo {
         name: "llvmpipe (LLVM 15)".into(),

@@ -316,6 +316,7 @@ fn time_paths(
         round: settings.round(),
         time: Some(Duration::from_secs_f64(time / f64::from(PICTURES))),
         error: None,
+        black: false,
         call: CALL,
         adaptive: None,
     };

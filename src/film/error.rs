@@ -1,0 +1,400 @@
+//! How wrong a film's picture still is, and how well that is known.
+//!
+//! The relative error is √ mean over pixels of s² / (Y² + (0.1 Ȳ)²): s is the standard error of a pixel's luminance Y, and Ȳ is
+//! the mean luminance of the picture. Both are unknown, and they are estimated apart.
+//!
+//! **s²** is estimated without bias, from the pixel's own replicates.
+//!
+//! **Y** must not be estimated from the pixel alone. Where light is rare, most pixels have not found any, and a pixel with one
+//! bright sample divides that sample's error by that sample. So Y is the mean of a *pool*: the smallest square around the pixel in
+//! which the light has come from at least [`ENOUGH`] samples. The number of samples that carry a sum is (Σ y)² / Σ y², after
+//! Kish: for n equal samples it is n. A pixel whose own light has come from so many samples stands for itself.
+//!
+//! A pool holds only pixels that may be as bright as the pixel itself. Otherwise a lamp would hide the noise of the wall beside
+//! it, and a black background would exaggerate the noise of an edge. If the light of two pixels comes in samples of size a (which
+//! adds a/n to the mean), the difference of their means has the variance a (Y₁ + Y₂) / n. Two pixels are compatible if the
+//! difference is at most [`COMPATIBLE`] of these standard deviations.
+//!
+//! The **uncertainty** of the relative error E has three parts, which are relative variances of E². The terms c of pixels are
+//! independent, and as few as they are uneven: Σ c² / (Σ c)². The means of the pools have the relative variance 1 / carriers, and
+//! count twice; pixels that share a pool share its error. The same holds for Ȳ.
+
+use super::reached::Reached;
+use super::{Film, REPLICATES, replicate_counts};
+use crate::stats::{luminance, percent, percent_to};
+use rayon::prelude::*;
+use std::fmt;
+
+/// Samples that must carry the light of a pool. Its mean then has a relative error of about 1/4.
+const ENOUGH: f64 = 16.0;
+
+/// Standard deviations by which the means of two pixels of one pool may differ.
+const COMPATIBLE: f64 = 2.0;
+
+/// Radii of the squares that are tried, in pixels. Beyond the last one, the mean of the picture is taken if it is less than the
+/// pool's.
+const RADII: [u32; 5] = [1, 3, 7, 15, 31];
+
+/// The largest relative uncertainty of an error that is called certain. Measured: see docs/stated-error.md.
+const MOST_UNCERTAIN: f64 = 0.10;
+
+/// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
+const EVEN: f64 = 5.0 / 3.0;
+
+/// The largest share of pixels without light that counts as chance.
+const MOST_UNLIT: f64 = 0.01;
+
+/// An estimate of a picture's relative error.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RelativeError {
+    /// The relative error; `None` while some pixel has fewer than two samples, and while no light was found. It is too large
+    /// while some pixel has a single replicate.
+    pub value: Option<f64>,
+    /// Standard error of `value`.
+    pub uncertainty: Option<f64>,
+    /// Why the true error may be far larger.
+    pub doubt: Option<Doubt>,
+}
+
+/// Why a stated error is not reliable.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// No path has found any light.
+    NoLight,
+    /// In this share of the picture paths have met surfaces, but found no light.
+    Unlit(f64),
+    /// The error rests on few bright samples, or on a single replicate.
+    Uncertain,
+}
+
+impl RelativeError {
+    /// Of a black picture that is known to be right.
+    pub const ZERO: Self = Self {
+        value: Some(0.0),
+        uncertainty: Some(0.0),
+        doubt: None,
+    };
+
+    /// The same, but for a picture in which nothing can shine, which is right to be black.
+    pub fn of_black(self, black: bool) -> Self {
+        if black && self.doubt == Some(Doubt::NoLight) {
+            Self::ZERO
+        } else {
+            self
+        }
+    }
+
+    /// The error that is compared with a wanted one: if it is uncertain by more than a tenth, the error plus twice its uncertainty.
+    /// `None` while it is not known, and while parts of the picture have found no light.
+    pub fn upper(&self) -> Option<f64> {
+        let (value, uncertainty) = (self.value?, self.uncertainty?);
+        match self.doubt {
+            Some(Doubt::NoLight | Doubt::Unlit(_)) => None,
+            _ if uncertainty > MOST_UNCERTAIN * value => Some(value + 2.0 * uncertainty),
+            _ => Some(value),
+        }
+    }
+}
+
+/// As a percentage with its uncertainty, and what there is to doubt.
+impl fmt::Display for RelativeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Some(value), Some(uncertainty)) = (self.value, self.uncertainty) else {
+            return match self.doubt {
+                Some(doubt) => doubt.fmt(f),
+                None => f.write_str("unknown"),
+            };
+        };
+        f.write_str(&percent(value))?;
+        if uncertainty > 0.0 {
+            write!(f, " \u{b1} {}", percent_to(uncertainty, 2))?;
+        }
+        match self.doubt {
+            None => Ok(()),
+            Some(Doubt::Uncertain) => f.write_str(" (uncertain)"),
+            Some(doubt) => write!(f, " ({doubt})"),
+        }
+    }
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoLight => f.write_str("no light found yet"),
+            Self::Unlit(share) => write!(
+                f,
+                "no light found yet in {:.0} % of the picture",
+                (share * 100.0).max(1.0)
+            ),
+            Self::Uncertain => f.write_str("it rests on too few samples"),
+        }
+    }
+}
+
+/// What the estimate needs to know of a pixel.
+#[derive(Debug, Clone, Copy, Default)]
+struct Light {
+    /// Number of samples.
+    n: f64,
+    /// Sum of their luminances.
+    sum: f64,
+    /// Sum of the squares.
+    squares: f64,
+    /// Squared standard error of the mean.
+    variance: f64,
+}
+
+impl Light {
+    fn mean(&self) -> f64 {
+        self.sum / self.n
+    }
+
+    /// How many samples carry the light.
+    fn carriers(&self) -> f64 {
+        carriers(self.sum, self.squares)
+    }
+
+    /// Whether this pixel and `other` may be equally bright.
+    fn compatible(&self, other: &Self) -> bool {
+        let size = (self.squares + other.squares) / (self.sum + other.sum);
+        let (a, b) = (self.mean(), other.mean());
+        // Each mean has the variance size * mean / n.
+        let variance = size * (a / self.n + b / other.n);
+        (a - b).powi(2) <= COMPATIBLE * COMPATIBLE * variance
+    }
+}
+
+fn carriers(sum: f64, squares: f64) -> f64 {
+    if squares > 0.0 {
+        sum * sum / squares
+    } else {
+        0.0
+    }
+}
+
+/// A pixel's part in the error.
+#[derive(Debug, Clone, Copy, Default)]
+struct Term {
+    /// s² / (Y² + floor²).
+    value: f64,
+    /// Relative variance of `value` by the pool's.
+    pool: f64,
+    /// Derivative of ln `value` by -ln floor², times `value`.
+    floor: f64,
+    /// Radius of the pool; 0 for the pixel alone, `u32::MAX` for the picture.
+    radius: u32,
+}
+
+impl Film {
+    /// The picture's relative error with its uncertainty.
+    pub fn relative_error(&self) -> RelativeError {
+        if self.coverage.samples().0 < 2 || self.replicates().0 == 0 {
+            return RelativeError::default();
+        }
+        let pixels = self.light();
+        let covered = pixels.iter().filter(|p| p.n > 0.0);
+        let (count, brightness) = covered.fold((0.0, 0.0), |t, p| (t.0 + 1.0, t.1 + p.mean()));
+        let mean = brightness / count;
+        if !(mean > 0.0 && mean.is_finite()) {
+            return RelativeError {
+                doubt: Some(Doubt::NoLight),
+                ..RelativeError::default()
+            };
+        }
+        let floor = (0.1 * mean).powi(2);
+        let width = self.bounds.width();
+        let picture = Square::new(&pixels, width);
+        let terms: Vec<Term> = (0..pixels.len())
+            .into_par_iter()
+            .map(|i| picture.term(i, mean, floor))
+            .collect();
+        let sum: f64 = terms.iter().map(|t| t.value).sum();
+        let value = (sum / count).sqrt();
+        let [mut uncertainty, mut by_rare_light] = [0.0; 2];
+        if sum > 0.0 {
+            let all = pixels
+                .iter()
+                .fold((0.0, 0.0), |t, p| (t.0 + p.sum, t.1 + p.squares));
+            let floors: f64 = terms.iter().map(|t| t.floor).sum();
+            let of_terms = terms.iter().map(|t| t.value * t.value).sum::<f64>() / (sum * sum);
+            let of_pools = shared_pools(&terms, width, sum) / (sum * sum);
+            let of_floor = 4.0 / carriers(all.0, all.1) * (floors / sum).powi(2);
+            uncertainty = 0.5 * (of_terms + of_pools + of_floor).sqrt();
+            let surplus = (of_terms - EVEN / count).max(0.0);
+            by_rare_light = 0.5 * (surplus + of_pools + of_floor).sqrt();
+        }
+        let single = self.replicates().0 < 2;
+        if single {
+            uncertainty = 1.0;
+        }
+        let unlit = self.unlit(&pixels) as f64 / count;
+        let doubt = if unlit > MOST_UNLIT {
+            Some(Doubt::Unlit(unlit))
+        } else {
+            (single || by_rare_light > MOST_UNCERTAIN).then_some(Doubt::Uncertain)
+        };
+        RelativeError {
+            value: Some(value),
+            uncertainty: Some(value * uncertainty),
+            doubt,
+        }
+    }
+
+    /// What is known of every pixel of the film's bounds, row by row.
+    fn light(&self) -> Vec<Light> {
+        let mut pixels = vec![Light::default(); self.bounds.area() as usize];
+        for (rect, ranges) in self.coverage.cells() {
+            let given = replicate_counts(ranges, self.strata);
+            for y in rect.y0..rect.y1 {
+                for x in rect.x0..rect.x1 {
+                    let sums = self.total(x, y);
+                    let counts = self.left_out.remaining(x, y, &given);
+                    let light = |r: usize| luminance([sums[r][0], sums[r][1], sums[r][2]]);
+                    let error = super::estimate(&sums, &counts).error[3];
+                    pixels[self.index(x, y)] = Light {
+                        n: counts.iter().sum::<u64>() as f64,
+                        sum: (0..REPLICATES).map(light).sum(),
+                        squares: sums.iter().map(|s| s[3]).sum(),
+                        variance: error * error,
+                    };
+                }
+            }
+        }
+        pixels
+    }
+
+    /// Pixels where paths have met surfaces, but neither they nor their neighbours have found light.
+    fn unlit(&self, pixels: &[Light]) -> u64 {
+        let Some(reached) = &self.reached else {
+            return 0;
+        };
+        let mut lit = vec![false; reached.blocks().len()];
+        let width = self.bounds.width() as usize;
+        for (i, _) in pixels.iter().enumerate().filter(|(_, p)| p.sum > 0.0) {
+            let (x, y) = ((i % width) as u32, (i / width) as u32);
+            lit[reached.index(self.bounds.x0 + x, self.bounds.y0 + y)] = true;
+        }
+        reached.unlit(&lit, self.coverage.cells().map(|c| c.0))
+    }
+
+    /// Notes that a path of pixel (x, y) has met a surface and gone on to look for light.
+    pub fn reach(&mut self, x: u32, y: u32) {
+        let size = self.size;
+        self.reached
+            .get_or_insert_with(|| Reached::new(size))
+            .note(x, y);
+    }
+}
+
+/// The pixels of a film, in rows of `width`.
+struct Square<'a> {
+    pixels: &'a [Light],
+    width: u32,
+    height: u32,
+}
+
+/// A rectangle of a film: columns and rows.
+type Window = [std::ops::Range<usize>; 2];
+
+impl<'a> Square<'a> {
+    fn new(pixels: &'a [Light], width: u32) -> Self {
+        Self {
+            pixels,
+            width,
+            height: (pixels.len() / width as usize) as u32,
+        }
+    }
+
+    /// Pixel number i's part in the error. `mean` and `floor` are Ȳ and (0.1 Ȳ)².
+    fn term(&self, i: usize, mean: f64, floor: f64) -> Term {
+        let pixel = &self.pixels[i];
+        if !(pixel.n > 0.0 && pixel.variance > 0.0) {
+            return Term::default();
+        }
+        let (y, carriers, radius) = self.pool(i, mean);
+        let scale = y * y + floor;
+        let value = pixel.variance / scale;
+        Term {
+            value,
+            pool: (y * y / scale).powi(2) * 4.0 / carriers.max(1.0),
+            floor: value * floor / scale,
+            radius,
+        }
+    }
+
+    /// Mean luminance of a pixel's pool, how many samples carry it, and its radius.
+    fn pool(&self, i: usize, mean: f64) -> (f64, f64, u32) {
+        let pixel = &self.pixels[i];
+        let own = pixel.carriers();
+        if own >= ENOUGH {
+            return (pixel.mean(), own, 0);
+        }
+        let mut best = (pixel.mean(), own);
+        for radius in RADII {
+            let [columns, rows] = window(i, radius, self.width, self.height);
+            let whole = columns.len() == self.width as usize && rows.len() == self.height as usize;
+            let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+            for y in rows {
+                for k in
+                    y * self.width as usize + columns.start..y * self.width as usize + columns.end
+                {
+                    let p = &self.pixels[k];
+                    if p.n > 0.0 && (k == i || pixel.compatible(p)) {
+                        n += p.n;
+                        sum += p.sum;
+                        squares += p.squares;
+                    }
+                }
+            }
+            best = (sum / n, carriers(sum, squares));
+            if best.1 >= ENOUGH || whole {
+                return (best.0, best.1, radius);
+            }
+        }
+        if mean < best.0 {
+            return (mean, best.1, u32::MAX);
+        }
+        (best.0, best.1, RADII[RADII.len() - 1])
+    }
+}
+
+/// The columns and rows within `radius` of pixel number i.
+fn window(i: usize, radius: u32, width: u32, height: u32) -> Window {
+    let [width, height, radius] = [width, height, radius].map(|n| n as usize);
+    let around = |at: usize, length: usize| {
+        at.saturating_sub(radius)..length.min(at.saturating_add(radius + 1))
+    };
+    [around(i % width, width), around(i / width, height)]
+}
+
+/// The variance of Σ value by the means of the pools: pixels that share a pool share its error.
+fn shared_pools(terms: &[Term], width: u32, sum: f64) -> f64 {
+    // Sums over all pixels above and to the left.
+    let columns = width as usize + 1;
+    let height = terms.len() / width as usize;
+    let mut sums = vec![0.0; columns * (height + 1)];
+    for (y, row) in terms.chunks(width as usize).enumerate() {
+        let mut so_far = 0.0;
+        for (x, term) in row.iter().enumerate() {
+            so_far += term.value;
+            sums[(y + 1) * columns + x + 1] = sums[y * columns + x + 1] + so_far;
+        }
+    }
+    let with_pools = terms.iter().enumerate().filter(|(_, t)| t.pool > 0.0);
+    let variance = with_pools.map(|(i, t)| {
+        let shared = match t.radius {
+            0 => t.value,
+            u32::MAX => sum,
+            radius => {
+                let [x, y] = window(i, radius, width, height as u32);
+                let at = |x: usize, y: usize| sums[y * columns + x];
+                at(x.end, y.end) - at(x.start, y.end) - at(x.end, y.start) + at(x.start, y.start)
+            }
+        };
+        t.value * t.pool * shared.max(t.value)
+    });
+    variance.sum()
+}
+
+#[cfg(test)]
+mod tests;

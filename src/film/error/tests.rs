@@ -1,0 +1,241 @@
+//! The stated error of simulated films, whose true error is known.
+
+use super::*;
+use crate::film::Sums;
+use crate::film::coverage::Rect;
+
+/// SplitMix64: uniform numbers from 0 to below 1.
+struct Uniform(u64);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ z >> 31) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+const SIZE: [u32; 2] = [48, 36];
+const PIXELS: f64 = (SIZE[0] * SIZE[1]) as f64;
+const SAMPLES: u64 = 64;
+
+/// Light of a pixel: `base` in every sample, and `flash` more with probability `chance`.
+#[derive(Clone, Copy)]
+struct Source {
+    base: f64,
+    flash: f64,
+    chance: f64,
+}
+
+impl Source {
+    fn mean(&self) -> f64 {
+        self.base + self.flash * self.chance
+    }
+
+    fn variance(&self) -> f64 {
+        self.flash.powi(2) * self.chance * (1.0 - self.chance)
+    }
+}
+
+fn simulated(source: impl Fn(u32, u32) -> Source, seed: u64) -> Film {
+    let mut rng = Uniform(seed << 32);
+    let whole = Rect::whole(SIZE);
+    let mut film = Film::new(SIZE, whole, 1);
+    let mut pixels = Vec::new();
+    for y in 0..SIZE[1] {
+        for x in 0..SIZE[0] {
+            let s = source(x, y);
+            let mut sums: [Sums<f64>; REPLICATES] = Default::default();
+            for k in 0..SAMPLES as usize {
+                let light = s.base + if rng.next() < s.chance { s.flash } else { 0.0 };
+                let added = [light, light, light, light * light];
+                let sum = &mut sums[k % REPLICATES];
+                sum.iter_mut().zip(added).for_each(|(s, a)| *s += a);
+            }
+            pixels.push(sums);
+        }
+    }
+    film.put_samples(whole, 0..SAMPLES, pixels);
+    film
+}
+
+/// The true relative error of such films.
+fn truth(source: impl Fn(u32, u32) -> Source) -> f64 {
+    let all = || (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
+    let mean = all().map(|(x, y)| source(x, y).mean()).sum::<f64>() / PIXELS;
+    let floor = (0.1 * mean).powi(2);
+    let term = |(x, y)| {
+        let s = source(x, y);
+        s.variance() / SAMPLES as f64 / (s.mean().powi(2) + floor)
+    };
+    (all().map(term).sum::<f64>() / PIXELS).sqrt()
+}
+
+/// Of many films that have found light: root mean square of the stated error over the true one, the spread of the stated errors,
+/// their mean stated uncertainty (both relative to the true one), and the share that is in doubt.
+fn stated(source: impl Fn(u32, u32) -> Source) -> [f64; 4] {
+    let truth = truth(&source);
+    let films = (0..60).map(|seed| simulated(&source, seed).relative_error());
+    let errors: Vec<RelativeError> = films.filter(|e| e.value.is_some()).collect();
+    let n = errors.len() as f64;
+    let values: Vec<f64> = errors.iter().filter_map(|e| e.value).collect();
+    let mean = values.iter().sum::<f64>() / n;
+    let square = values.iter().map(|v| v * v).sum::<f64>() / n;
+    let uncertainty = errors.iter().filter_map(|e| e.uncertainty).sum::<f64>() / n;
+    let doubted = errors.iter().filter(|e| e.doubt.is_some()).count() as f64 / n;
+    [
+        square.sqrt() / truth,
+        (square - mean * mean).max(0.0).sqrt() / truth,
+        uncertainty / truth,
+        doubted,
+    ]
+}
+
+/// From a picture in which one sample has found light to one in which all have.
+#[test]
+fn evenly_lit_pictures_state_their_error_however_rare_the_light_is() {
+    for found in [1.5, 4.0, 16.0, 64.0, 256.0, 1e3, 4e3, 16e3, 64e3] {
+        let even = |_, _| Source {
+            base: 0.0,
+            flash: 1.0,
+            chance: found / (PIXELS * SAMPLES as f64),
+        };
+        let [ratio, spread, uncertainty, doubted] = stated(even);
+        println!(
+            "{found}: {ratio:.3}, spread {spread:.3}, stated {uncertainty:.3}, doubted {doubted}"
+        );
+        // With few samples the square of the error is 1 / found on average, which is above 1 / the mean of found, and cannot be
+        // less than 1.
+        let bounds = if found < 10.0 { 0.7..1.35 } else { 0.9..1.15 };
+        assert!(bounds.contains(&ratio), "{found}: {ratio}");
+        assert!(
+            uncertainty > 0.5 * spread,
+            "{found}: {uncertainty}, {spread}"
+        );
+        // A spread of an eighth needs some sixteen samples.
+        assert_eq!(doubted, if found < 100.0 { 1.0 } else { 0.0 }, "{found}");
+    }
+}
+
+/// Rare flashes on light that every sample finds: before, a pixel with a flash divided the flash's error by the flash.
+#[test]
+fn flashes_on_a_steady_light_are_not_divided_by_themselves() {
+    let source = |x: u32, _| Source {
+        base: 1.0 + f64::from(x) / 16.0,
+        flash: 300.0,
+        chance: 3e-4,
+    };
+    let [ratio, spread, uncertainty, doubted] = stated(source);
+    println!("{ratio:.3}, spread {spread:.3}, stated {uncertainty:.3}, doubted {doubted}");
+    assert!((0.85..1.15).contains(&ratio), "{ratio}");
+    assert!(uncertainty > 0.5 * spread, "{uncertainty}, {spread}");
+}
+
+/// A lamp in the picture, and a wall around it that only rare light reaches.
+#[test]
+fn a_lamp_does_not_hide_the_noise_of_the_wall_beside_it() {
+    let source = |x: u32, y: u32| {
+        if (20..28).contains(&x) && (14..22).contains(&y) {
+            Source {
+                base: 5.0,
+                flash: 0.0,
+                chance: 0.0,
+            }
+        } else {
+            Source {
+                base: 0.0,
+                flash: 40.0,
+                chance: 2e-3,
+            }
+        }
+    };
+    let [ratio, spread, uncertainty, _] = stated(source);
+    println!("{ratio:.3}, spread {spread:.3}, stated {uncertainty:.3}");
+    assert!((0.8..1.2).contains(&ratio), "{ratio}");
+}
+
+/// Beside a background without light, edges keep their own brightness.
+#[test]
+fn a_black_background_does_not_exaggerate_the_noise_of_an_edge() {
+    let source = |x: u32, y: u32| {
+        let inside = (x / 3 + y / 3) % 2 == 0;
+        Source {
+            base: 0.0,
+            flash: if inside { 2.0 } else { 0.0 },
+            chance: 0.2,
+        }
+    };
+    let [ratio, _, _, doubted] = stated(source);
+    println!("{ratio:.3}");
+    assert!((0.85..1.15).contains(&ratio) && doubted == 0.0, "{ratio}");
+}
+
+#[test]
+fn a_picture_without_light_states_no_error() {
+    let black = |_, _| Source {
+        base: 0.0,
+        flash: 0.0,
+        chance: 0.0,
+    };
+    let error = simulated(black, 1).relative_error();
+    let expected = RelativeError {
+        doubt: Some(Doubt::NoLight),
+        ..RelativeError::default()
+    };
+    assert_eq!(error, expected);
+    assert_eq!(error.upper(), None);
+    assert_eq!(error.of_black(false), expected);
+    assert_eq!(error.of_black(true), RelativeError::ZERO);
+}
+
+/// One corner of the picture shines. Elsewhere paths have met surfaces, or nothing.
+#[test]
+fn surfaces_that_no_light_was_found_on_are_told_from_a_background() {
+    let source = |x: u32, y: u32| Source {
+        base: if x < 12 && y < 12 { 1.0 } else { 0.0 },
+        flash: 0.0,
+        chance: 0.0,
+    };
+    let mut film = simulated(source, 1);
+    assert_eq!(film.relative_error(), RelativeError::ZERO);
+    for y in 0..SIZE[1] {
+        for x in 0..24 {
+            film.reach(x, y);
+        }
+    }
+    // 24 columns but for the corner and the blocks beside it, which reach to pixel 15.
+    let share = (24.0 * 36.0 - 16.0 * 16.0) / PIXELS;
+    let error = film.relative_error();
+    assert_eq!(error.doubt, Some(Doubt::Unlit(share)));
+    assert_eq!(error.upper(), None);
+}
+
+#[test]
+fn a_picture_of_one_sample_states_no_error_and_one_of_two_states_a_limit() {
+    let rect = Rect::whole([1, 1]);
+    let mut film = Film::new([1, 1], rect, 2);
+    let one =
+        |sum: f64, squares: f64| vec![[[sum, sum, sum, squares], [0.0; 4], [0.0; 4], [0.0; 4]]];
+    film.put_samples(rect, 0..1, one(2.0, 4.0));
+    assert_eq!(film.relative_error(), RelativeError::default());
+    // Another one of 4: mean 3, squares 4 + 16, one replicate. Two samples do not make a pool of 16, but there are no others.
+    film.put_samples(rect, 1..2, one(6.0, 20.0));
+    let expected = 20f64.sqrt() / 2.0 / (9.0 + 0.09f64).sqrt();
+    let error = film.relative_error();
+    assert!((error.value.unwrap() - expected).abs() < 1e-12, "{error}");
+    assert_eq!(error.uncertainty, error.value);
+    assert_eq!(error.doubt, Some(Doubt::Uncertain));
+}
+
+/// A picture of one pixel, whose error is the textbook standard error: √(5/3 / 4) of 102.5.
+#[test]
+fn small_errors_are_those_of_the_textbook() {
+    let rect = Rect::whole([1, 1]);
+    let mut film = Film::new([1, 1], rect, 1);
+    let light = [101.0, 102.0, 103.0, 104.0];
+    film.put_samples(rect, 0..4, vec![light.map(|y| [y, y, y, y * y])]);
+    let expected = (5.0f64 / 3.0 / 4.0).sqrt() / (102.5 * 1.01f64.sqrt());
+    let error = film.relative_error().value.unwrap();
+    assert!((error / expected - 1.0).abs() < 1e-12, "{error}");
+}
