@@ -2,7 +2,8 @@
 
 use super::args::CheckArgs;
 use super::failure::Failure;
-use crate::scene::{Scene, check as lints, parse};
+use crate::render::{Backend, Options, render};
+use crate::scene::{Light, Place, Scene, check as lints, parse};
 use std::path::Path;
 
 /// Reads and lints every file. The exit status is that of the first file that fails.
@@ -21,13 +22,57 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     first_failure.map_or(Ok(()), Err)
 }
 
+/// Size and samples of the pictures that show whether a light reaches the eye.
+const SIZE: [u32; 2] = [32, 24];
+const SAMPLES: u64 = 16;
+const PATHS: u64 = SIZE[0] as u64 * SIZE[1] as u64 * SAMPLES;
+
+/// Scenes with more pairs of a light and a surface are not tried: a ray of the reference meets every surface, and each light has a
+/// picture of its own.
+const MOST_PAIRS: usize = 1000;
+
+/// Where the lights stand that a small picture shows nothing of. Lights that emit nothing, or are known to be hidden, have another
+/// warning.
+fn idle_lights(scene: &Scene) -> Vec<Place> {
+    if scene.lights.len() * (scene.primitives.len() + 1) > MOST_PAIRS {
+        return Vec::new();
+    }
+    let known: Vec<usize> = lints::lint(scene).iter().map(|w| w.line).collect();
+    let options = Options {
+        spp: Some(SAMPLES),
+        size: Some(SIZE),
+        backend: Backend::Cpu,
+        ..Options::default()
+    };
+    let is_idle = |light: &&Light| {
+        let alone = Scene {
+            lights: vec![**light],
+            ..scene.clone()
+        };
+        let picture = render(&alone, &options);
+        picture.is_ok_and(|p| p.pixels().iter().flatten().all(|x| *x == 0.0))
+    };
+    let candidates = scene.lights.iter().filter(|l| !known.contains(&l.line));
+    candidates.filter(is_idle).map(Light::place).collect()
+}
+
 /// Prints warnings on stderr, and a summary of the valid file on stdout.
 fn report(path: &Path, scene: &Scene) -> Result<(), Failure> {
     let warnings = lints::lint(scene);
+    let idle = idle_lights(scene);
     for w in &warnings {
         super::say!("warning: {w}");
     }
-    let verdict = match warnings.len() {
+    for place in &idle {
+        super::say!(
+            "warning: {}:{}:{}: the light at line {} has lit nothing: none of {PATHS} paths has found any of its light",
+            path.display(),
+            place.line,
+            place.column,
+            place.line
+        );
+    }
+    let verdict = match warnings.len() + idle.len() {
         0 => "ok".to_owned(),
         1 => "1 warning".to_owned(),
         n => format!("{n} warnings"),

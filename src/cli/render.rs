@@ -392,7 +392,7 @@ fn warn(
     let doubt = provenance.error(film).doubt.filter(|_| !quiet);
     match doubt {
         Some(Doubt::NoLight) => say!(
-            "warning: no light found yet: the picture is black, and its error is not known; take more samples (--spp, --time)"
+            "warning: no light found yet: the picture is black, and its error is not known; take more samples (--spp, --time), or see: etendue check"
         ),
         Some(doubt @ Doubt::Unlit(_)) => say!(
             "warning: {doubt}, so the true relative error may be far above the stated one; take more samples (--spp, --time)"

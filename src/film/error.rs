@@ -133,13 +133,13 @@ impl fmt::Display for Doubt {
 
 /// What the estimate needs to know of a pixel.
 #[derive(Debug, Clone, Copy, Default)]
-struct Light {
+pub(super) struct Light {
     /// Number of samples.
-    n: f64,
+    pub n: f64,
     /// Sum of their luminances.
-    sum: f64,
+    pub sum: f64,
     /// Sum of the squares.
-    squares: f64,
+    pub squares: f64,
     /// Squared standard error of the mean.
     variance: f64,
 }
@@ -150,7 +150,7 @@ impl Light {
     }
 
     /// How many samples carry the light.
-    fn carriers(&self) -> f64 {
+    pub fn carriers(&self) -> f64 {
         carriers(self.sum, self.squares)
     }
 
@@ -241,7 +241,7 @@ impl Film {
     }
 
     /// What is known of every pixel of the film's bounds, row by row.
-    fn light(&self) -> Vec<Light> {
+    pub(super) fn light(&self) -> Vec<Light> {
         let mut pixels = vec![Light::default(); self.bounds.area() as usize];
         for (rect, ranges) in self.coverage.cells() {
             let given = replicate_counts(ranges, self.strata);
@@ -275,6 +275,11 @@ impl Film {
             lit[reached.index(self.bounds.x0 + x, self.bounds.y0 + y)] = true;
         }
         reached.unlit(&lit, self.coverage.cells().map(|c| c.0))
+    }
+
+    /// Whether a path near pixel (x, y) has met a surface and gone on to look for light.
+    pub fn has_reached(&self, x: u32, y: u32) -> bool {
+        self.reached.as_ref().is_some_and(|r| r.has(x, y))
     }
 
     /// Notes that a path of pixel (x, y) has met a surface and gone on to look for light.

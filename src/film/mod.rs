@@ -12,6 +12,7 @@ pub mod error;
 mod left_out;
 pub mod merge;
 pub mod pilot;
+mod pooled;
 pub mod reached;
 
 use crate::stats::luminance;

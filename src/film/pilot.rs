@@ -157,7 +157,7 @@ impl Pilot {
     pub fn measurement(&self) -> Measurement {
         let grid = self.grid(CELL);
         Measurement {
-            cells: vec![[0.0; 3]; grid.len()],
+            cells: vec![[0.0; 4]; grid.len()],
             grid,
         }
     }
@@ -171,14 +171,18 @@ impl Pilot {
             .fold([0.0; 2], |t, c| [t[0] + c[1], t[1] + c[2]]);
         let floor = 0.1 * total[0] / total[1].max(1.0);
         let mut squares = vec![[0.0; 2]; grid.len()];
-        for (i, [variance, light, pixels]) in measured.cells.iter().enumerate() {
+        let mut light_of = vec![0.0; grid.len()];
+        let mut reached = vec![false; grid.len()];
+        for (i, [variance, light, pixels, met]) in measured.cells.iter().enumerate() {
+            let [x, y] = measured.grid.corner(i);
+            light_of[grid.index(x, y)] += light;
+            reached[grid.index(x, y)] |= *met > 0.0;
             let mean = light / pixels;
             let scale = mean * mean + floor * floor;
             // No pixels, or a black picture.
             if !(scale > 0.0 && scale.is_finite()) {
                 continue;
             }
-            let [x, y] = measured.grid.corner(i);
             let square = &mut squares[grid.index(x, y)];
             square[0] += variance / scale;
             square[1] += pixels;
@@ -187,10 +191,17 @@ impl Pilot {
             let v = sum / pixels;
             if v.is_finite() { v.max(0.0) } else { 0.0 }
         };
-        self.stages.push(Stage {
-            samples,
-            variance: squares.into_iter().map(mean).collect(),
-        });
+        let mut variance: Vec<f64> = squares.into_iter().map(mean).collect();
+        // What a pilot has met but found no light on is as noisy as the rest, for all that is known.
+        let unknown: Vec<bool> = (0..grid.len())
+            .map(|i| reached[i] && light_of[i] == 0.0)
+            .collect();
+        let known = variance.iter().zip(&unknown).filter(|(_, u)| !**u);
+        let (sum, count) = known.fold((0.0, 0.0), |t, (v, _)| (t.0 + v, t.1 + 1.0));
+        for (v, _) in variance.iter_mut().zip(unknown).filter(|(_, u)| *u) {
+            *v = sum / f64::max(count, 1.0);
+        }
+        self.stages.push(Stage { samples, variance });
     }
 
     /// How many samples each of [`tiles`](Self::tiles) should have, up to a factor, by the first `stages` pilots.
@@ -297,8 +308,8 @@ impl Grid {
 /// What a pilot finds.
 pub struct Measurement {
     grid: Grid,
-    /// Of every cell: sums of its pixels' variances and luminances, and how many pixels.
-    cells: Vec<[f64; 3]>,
+    /// Of every cell: sums of its pixels' variances and luminances, how many pixels, and in how many paths have met surfaces.
+    cells: Vec<[f64; 4]>,
 }
 
 impl Measurement {
@@ -315,6 +326,7 @@ impl Measurement {
                 cell[0] += variance.max(0.0);
                 cell[1] += light / n;
                 cell[2] += 1.0;
+                cell[3] += f64::from(film.has_reached(x, y));
             }
         }
     }
@@ -359,6 +371,33 @@ mod tests {
         let more = pilot.fill(&tiles, &counts, 176, 1, 16);
         assert!(more.iter().zip(&counts).all(|(m, c)| m >= c), "{more:?}");
         assert_eq!(more.iter().sum::<u64>(), 176 * 8);
+    }
+
+    /// The right half meets surfaces, and has found no light; or nothing is there.
+    #[test]
+    fn tiles_without_light_do_not_starve_if_they_may_have_some() {
+        let whole = Rect::whole([64, 32]);
+        let pixel = |k: u32| -> [Sums<f64>; REPLICATES] {
+            let y = if k % 64 < 32 {
+                [0.9, 1.1, 0.9, 1.1]
+            } else {
+                [0.0; 4]
+            };
+            y.map(|y| [y, y, y, y * y])
+        };
+        for met in [true, false] {
+            let mut pilot = Pilot::new(&[whole]);
+            let mut film = Film::new([64, 32], whole, 1);
+            film.put_samples(whole, 0..4, (0..64 * 32).map(pixel).collect());
+            for y in 0..32 {
+                (0..if met { 64 } else { 32 }).for_each(|x| film.reach(x, y));
+            }
+            let mut measured = pilot.measurement();
+            measured.take(&film, 4);
+            pilot.add(&measured, 4);
+            let counts = pilot.fill(&pilot.tiles(), &[32; 8], 160, 1, 16);
+            assert_eq!(counts[3] >= 150, met, "{counts:?}");
+        }
     }
 
     #[test]

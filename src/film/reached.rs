@@ -51,6 +51,11 @@ impl Reached {
         self.blocks[i] = 1;
     }
 
+    /// Whether a path of the block of pixel (x, y) has scattered.
+    pub(super) fn has(&self, x: u32, y: u32) -> bool {
+        self.blocks[self.index(x, y)] == 1
+    }
+
     /// Notes what `other`, of the same picture, does.
     pub(super) fn merge(&mut self, other: &Self) {
         let both = self.blocks.iter_mut().zip(&other.blocks);

@@ -4,7 +4,7 @@ mod exr;
 mod exr_read;
 mod metadata;
 mod npz;
-mod pixels;
+pub mod pixels;
 mod png;
 pub mod report;
 pub mod store;

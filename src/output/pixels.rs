@@ -9,6 +9,8 @@ pub struct Pixels<'a> {
     /// For each pixel of the film's bounds, one more than its place in `counts`; 0 where there is nothing.
     cell: Vec<u32>,
     counts: Vec<[u64; REPLICATES]>,
+    /// Errors of pixels that share theirs with their neighbours.
+    shared: Option<Vec<Option<[f32; 4]>>>,
     covered: u64,
 }
 
@@ -30,6 +32,7 @@ impl<'a> Pixels<'a> {
             film,
             cell,
             counts,
+            shared: film.shared_errors(),
             covered,
         }
     }
@@ -41,7 +44,11 @@ impl<'a> Pixels<'a> {
         }
         let cell = self.cell[self.film.index(x, y)];
         let counts = self.counts.get((cell as usize).checked_sub(1)?)?;
-        Some(self.film.estimate(x, y, counts))
+        let mut estimate = self.film.estimate(x, y, counts);
+        if let Some(errors) = self.shared.as_ref().and_then(|s| s[self.film.index(x, y)]) {
+            estimate.error = errors.map(f64::from);
+        }
+        Some(estimate)
     }
 
     /// Whether every pixel of the picture has samples.

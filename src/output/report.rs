@@ -54,6 +54,22 @@ pub struct Report {
     pub truncated_paths: u64,
     /// Samples of this run left out because they were NaN or infinite.
     pub nonfinite_samples: u64,
+    /// What this run has done.
+    pub run: Work,
+    /// What is in the picture: the work of this run and of all before.
+    pub film: Work,
+}
+
+/// Keys `run` and `film`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Work {
+    /// Mean samples per pixel over the pixels that have samples.
+    #[serde(serialize_with = "count_or_mean")]
+    pub spp: f64,
+    /// Camera paths.
+    pub paths: u64,
+    /// Rendering.
+    pub seconds: f64,
 }
 
 /// Key `adapter`.
@@ -101,6 +117,7 @@ impl Report {
             (seconds > 0.0).then(|| count as f64 / seconds)
         };
         let error = provenance.error(film);
+        let pixels: u64 = film.coverage.cells().map(|c| c.0.area()).sum();
         Self {
             version: provenance.version.clone(),
             scene: run.scene,
@@ -130,6 +147,16 @@ impl Report {
             mean_luminance: film.mean_luminance(),
             truncated_paths: run.counters.truncated,
             nonfinite_samples: run.counters.nonfinite,
+            run: Work {
+                spp: run.counters.paths as f64 / pixels.max(1) as f64,
+                paths: run.counters.paths,
+                seconds: run.seconds.render,
+            },
+            film: Work {
+                spp: film.coverage.mean(),
+                paths: provenance.counters.paths,
+                seconds: provenance.seconds,
+            },
         }
     }
 
@@ -210,6 +237,8 @@ mod tests {
             "mean_luminance": 0.5,
             "truncated_paths": 1,
             "nonfinite_samples": 0,
+            "run": {"spp": 4, "paths": 8, "seconds": 2.0},
+            "film": {"spp": 4, "paths": 12, "seconds": 1.5},
         });
         assert_eq!(report(&film, 2.0), expected);
     }

@@ -456,3 +456,19 @@ fn an_adaptive_wave_is_a_few_large_calls() {
     let differ = |parts: &Vec<Part>| parts.iter().any(|p| p.samples != parts[0].samples);
     assert!(engine.calls.iter().any(differ));
 }
+
+/// A lamp that no path has found yet ends no run. A scene without light does.
+#[test]
+fn a_black_picture_never_reaches_an_error_unless_it_must_be_black() {
+    let size = [16, 16];
+    for (black, reason) in [(false, StopReason::Samples), (true, StopReason::Error)] {
+        let mut job = job(size, 256, 0..600);
+        job.error = Some(0.5);
+        job.black = black;
+        let mut engine = Fake::new();
+        engine.value = |_| 0.0;
+        let mut film = Film::new(size, Rect::whole(size), 2);
+        assert_eq!(run(&job, &mut engine, &mut film), reason);
+        assert_eq!(film.coverage.samples().0, if black { 16 } else { 600 });
+    }
+}

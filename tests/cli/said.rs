@@ -220,3 +220,74 @@ fn long_stages_are_shown_only_on_a_terminal() {
         assert!(!said(name).contains("reading"), "{:?}", said(name));
     }
 }
+
+/// A resumed film's report tells the work of this run from that of all.
+#[test]
+fn a_report_tells_this_run_from_the_film() {
+    let bench = Bench::new();
+    bench.render("--spp 8 --film f.npz -o a.png");
+    bench.render("--spp 32 --film f.npz -o a.png --report r.json");
+    let report = fs::read_to_string(bench.path("r.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(
+        (&report["spp"], &report["paths"]),
+        (&32.into(), &(24 * 24 * 16).into())
+    );
+    let work = |key: &str| {
+        (
+            report[key]["spp"].as_u64().unwrap(),
+            report[key]["paths"].as_u64().unwrap(),
+        )
+    };
+    assert_eq!(work("run"), (24, 24 * 24 * 16));
+    assert_eq!(work("film"), (32, 32 * 24 * 16));
+    let seconds = |key: &str| report[key]["seconds"].as_f64().unwrap();
+    assert!(seconds("film") > seconds("run") && seconds("run") > 0.0);
+}
+
+/// A ball under a lamp of this radiance that faces away from it.
+fn turned_away(radiance: f64) -> String {
+    format!(
+        "camera = {{ eye = [0, 1, 4], look_at = [0, 0.5, 0], vfov = 40, resolution = [24, 16] }}\n\
+         sphere = [{{ center = [0, 0.5, 0], radius = 0.5, material = \"white\" }}]\n\
+         [material.white]\ntype = \"diffuse\"\nreflectance = [0.7, 0.7, 0.7]\n\
+         [[light]]\ncenter = [0, 3, 0]\nnormal = [0, 1, 0]\nradius = 0.2\nradiance = [{radiance:?}, 0, 0]\n"
+    )
+}
+
+#[test]
+fn check_names_lights_that_have_lit_nothing() {
+    let bench = Bench::new();
+    let other =
+        "[[light]]\ncenter = [0, 3, 1]\nnormal = [0, -1, 0]\nradius = 0.2\nradiance = [5, 5, 5]\n";
+    fs::write(bench.path("idle.toml"), turned_away(5.0) + other).unwrap();
+    bench.run("check idle.toml").success().stderr(
+        says("idle.toml:6:1: the light at line 6 has lit nothing").and(says("line 11").not()),
+    );
+}
+
+/// Nothing found is nothing known, unless no lamp shines.
+#[test]
+fn a_black_picture_of_a_lit_scene_states_no_error() {
+    let bench = Bench::new();
+    for (radiance, error, stop_reason) in [(5.0, None, "spp"), (0.0, Some(0.0), "error")] {
+        fs::write(bench.path("dark.toml"), turned_away(radiance)).unwrap();
+        let done = bench
+            .run("render dark.toml --backend cpu --spp 64 --error 5% -o a.exr --report r.json")
+            .success();
+        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+        assert_eq!(
+            said.contains("no light found yet"),
+            error.is_none(),
+            "{said}"
+        );
+        let report = fs::read_to_string(bench.path("r.json")).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        assert_eq!(report["relative_error"].as_f64(), error);
+        assert_eq!(report["stop_reason"], stop_reason);
+        let doubt = error.map_or("no light found yet".into(), |_| serde_json::Value::Null);
+        assert_eq!(report["relative_error_doubt"], doubt);
+        let header = bench.picture("a.exr").attributes;
+        assert_eq!(header.contains_key("relative_error"), error.is_some());
+    }
+}

@@ -239,3 +239,56 @@ fn small_errors_are_those_of_the_textbook() {
     let error = film.relative_error().value.unwrap();
     assert!((error / expected - 1.0).abs() < 1e-12, "{error}");
 }
+
+/// On the left light is rare, on the right there is nothing to meet.
+#[test]
+fn pixels_without_light_share_the_error_of_those_that_found_some() {
+    let source = |x: u32, _| Source {
+        base: 0.0,
+        flash: 3.0,
+        chance: if x < 24 { 1e-3 } else { 0.0 },
+    };
+    let mut film = simulated(source, 1);
+    assert_eq!(film.shared_errors(), None, "nothing is known of surfaces");
+    for y in 0..SIZE[1] {
+        for x in 0..24 {
+            film.reach(x, y);
+        }
+    }
+    let shared = film.shared_errors().unwrap();
+    let truth = (source(0, 0).variance() / SAMPLES as f64).sqrt();
+    let (mut least, mut most, mut squares) = (f64::INFINITY, 0.0f64, 0.0);
+    for (i, error) in shared.iter().enumerate() {
+        if i % SIZE[0] as usize >= 24 {
+            assert_eq!(*error, None);
+            continue;
+        }
+        // All four numbers are the same: the light is grey. A pixel that has found light twice keeps its error.
+        let own = film.total(i as u32 % SIZE[0], i as u32 / SIZE[0]);
+        let found = own.iter().map(|s| s[3]).sum::<f64>() / 9.0;
+        assert_eq!(error.is_none(), found > 1.5, "pixel {i}");
+        let Some([r, g, b, y]) = *error else { continue };
+        assert!(r == g && g == b && (y / r - 1.0).abs() < 1e-6);
+        least = least.min(f64::from(y) / truth);
+        most = most.max(f64::from(y) / truth);
+        squares += (f64::from(y) / truth).powi(2);
+    }
+    let mean = (squares / (PIXELS / 2.0)).sqrt();
+    println!("{least} to {most}, {mean}");
+    assert!(least > 0.5 && most < 1.6 && (0.9..1.1).contains(&mean));
+}
+
+/// A rare flash on a steady light stays with the pixel that has found it.
+#[test]
+fn pixels_with_light_keep_their_own_errors() {
+    let source = |_, _| Source {
+        base: 1.0,
+        flash: 300.0,
+        chance: 3e-4,
+    };
+    let mut film = simulated(source, 1);
+    for y in 0..SIZE[1] {
+        (0..SIZE[0]).for_each(|x| film.reach(x, y));
+    }
+    assert_eq!(film.shared_errors(), None);
+}
