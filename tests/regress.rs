@@ -260,6 +260,33 @@ fn goldens_respect_max_spp_and_warn_if_they_are_noisy() {
     }
 }
 
+/// The lamp is turned away, so that the picture stays black; or it is off, so that it must be black.
+#[test]
+fn a_golden_without_light_is_no_evidence() {
+    let dark = BALL.replace("normal = [0.0, -1.0, 0.0]", "normal = [0.0, 1.0, 0.0]");
+    let f = Folder::new(&[]);
+    f.put("one", &dark);
+    f.run(&["--bless", "--max-spp", "64"])
+        .code(2)
+        .stdout(contains("holds next to no light").and(contains("no evidence")));
+    assert!(!f.golden("one.exr").exists());
+    // A golden that an earlier version has made.
+    let (film, mut provenance) = render(&dark, 0, 64);
+    provenance.describe(&film);
+    std::fs::create_dir_all(f.path("golden")).expect("made");
+    write_exr(&f.golden("one.exr"), &film, &provenance).expect("written");
+    f.run(&[])
+        .code(2)
+        .stdout(contains("unusable  one").and(contains("no evidence")));
+
+    f.put(
+        "one",
+        &dark.replace("[20.0, 20.0, 20.0]", "[0.0, 0.0, 0.0]"),
+    );
+    f.run(&["--bless", "--max-spp", "64"]).code(0);
+    f.run(&[]).code(0);
+}
+
 #[test]
 fn without_an_adapter_there_is_no_verdict() {
     let f = Folder::new(&["one"]);

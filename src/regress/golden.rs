@@ -67,17 +67,11 @@ impl fmt::Display for Bless {
 impl Bless {
     /// A warning if comparisons detect only larger changes than `wanted`.
     pub fn warning(&self, wanted: f64) -> Option<String> {
-        let sees = if self.power >= 1.0 {
-            "not detect even a doubling of the whole picture's brightness".to_owned()
-        } else {
-            format!(
-                "detect a change of the whole picture's brightness by {:.2} % or more",
-                100.0 * self.power
-            )
-        };
         self.short.then(|| {
             format!(
-                "comparisons with this golden will {sees}, but --power asks for {:.2} %; raise --max-spp",
+                "comparisons with this golden will detect a change of the whole picture's brightness by {:.2} % or more, but \
+                 --power asks for {:.2} %; raise --max-spp",
+                100.0 * self.power,
                 100.0 * wanted
             )
         })
@@ -126,9 +120,7 @@ pub fn bless(
             return Ok(None);
         }
         let picture = Picture::from_film(path.display().to_string(), &film, &provenance)?;
-        // Compared with itself, it gives the sensitivity of a comparison with a similar picture.
-        let seen = verdict(&picture, &picture, wanted.alpha).sensitivity;
-        let power = seen.first().map_or(f64::INFINITY, |s| s.change);
+        let power = smallest_change(&picture, wanted.alpha);
         if power <= wanted.power || samples >= most {
             break power;
         }
@@ -136,6 +128,9 @@ pub fn bless(
         let factor = (1.05 * (power / wanted.power).powi(2)).clamp(1.1, 8.0);
         samples = whole_rounds(samples as f64 * factor);
     };
+    if power >= NO_EVIDENCE && !provenance.black {
+        return Err(no_evidence(&path.display().to_string(), "raise --max-spp").into());
+    }
     let golden = case.golden_path();
     let folder = case.dir.join("golden");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
@@ -149,6 +144,34 @@ pub fn bless(
         short: power > wanted.power,
         bytes: bytes.len(),
     }))
+}
+
+/// A golden is no evidence if comparisons with it do not detect a change of the whole picture's brightness by so much: it holds
+/// next to no light beside its noise.
+const NO_EVIDENCE: f64 = 1.0;
+
+/// The smallest change of the whole picture's brightness that a comparison with a similar picture detects.
+fn smallest_change(picture: &Picture, alpha: f64) -> f64 {
+    let seen = verdict(picture, picture, alpha).sensitivity;
+    seen.first().map_or(f64::INFINITY, |s| s.change)
+}
+
+fn no_evidence(name: &str, remedy: &str) -> String {
+    format!(
+        "{name}: the picture holds next to no light beside its noise: a golden of it is no evidence, since even a doubling of its \
+         brightness would pass; {remedy}"
+    )
+}
+
+/// Refuses a golden that is no evidence. A picture that is `black` by construction is.
+pub(super) fn check_evidence(golden: &Picture, alpha: f64, black: bool) -> Result<(), String> {
+    if black || smallest_change(golden, alpha) < NO_EVIDENCE {
+        return Ok(());
+    }
+    Err(no_evidence(
+        &golden.name,
+        "re-create it with --bless and a higher --max-spp",
+    ))
 }
 
 /// The unit of a golden's samples, and the most of them that there may be: whole rounds of all replicates, or of some where

@@ -206,6 +206,7 @@ impl Case {
             )
             .into());
         }
+        golden::check_evidence(&golden, limits.alpha, provenance.black)?;
         let world = World::new(&scene, settings.size);
         let (mut engine, tile) = engine(&world, &settings)?;
         let rect = Rect::whole(settings.size);
