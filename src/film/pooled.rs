@@ -3,11 +3,13 @@
 //! Such a pixel's samples agree by chance: all are zero. Its standard error is not zero. It is the same as that of its neighbours,
 //! a few of which have found a bright sample and state an error that is too large for themselves alone. So these pixels share the
 //! mean of their squared errors. That leaves the sum of the squares as it was, which is right on average.
+//!
+//! A pixel of few samples may be dark without light being rare, so pixels with fewer than [`ENOUGH`] keep what they state.
 
 use super::{Film, REPLICATES, replicate_counts};
 use rayon::prelude::*;
 
-/// A pixel shares its error if its light has come from fewer samples than this, after Kish: from none or one.
+/// A pixel shares its error if its light has come from fewer samples than this, after Kish [Kish1965]: from none or one.
 const FEW: f64 = 2.0;
 
 /// Samples that must carry the light of those that share.
@@ -33,7 +35,7 @@ impl Film {
         let pixels = self.light();
         let may_share = |i: usize| {
             let [x, y] = [i % width, i / width].map(|n| n as u32);
-            pixels[i].n > 0.0
+            pixels[i].n >= ENOUGH
                 && pixels[i].carriers() < FEW
                 && reached.has(self.bounds.x0 + x, self.bounds.y0 + y)
         };
