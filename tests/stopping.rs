@@ -13,6 +13,7 @@ use etendue::film::coverage::Rect;
 use etendue::run::{CALL, Job, Run, StopReason, tiles};
 use etendue::scene::Scene;
 use etendue::stats::luminance;
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 /// What is measured.
@@ -32,13 +33,15 @@ impl Case {
     }
 }
 
+/// A scene of `scenes/` or of `tests/stated_error/`.
 fn scene(name: &str) -> Scene {
-    read(
-        &scene_files()
-            .into_iter()
-            .find(|p| p.file_stem().is_some_and(|s| s == name))
-            .expect("it is there"),
-    )
+    let ours = scene_files().into_iter();
+    let file = ours
+        .clone()
+        .find(|p| p.file_stem().is_some_and(|s| s == name));
+    let other =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/stated_error/{name}.toml"));
+    read(&file.unwrap_or(other))
 }
 
 /// Renders with this seed until the film's own error says that it is enough.
@@ -186,7 +189,30 @@ fn a_hundred_pictures_with_many_lights() {
 }
 
 #[test]
-#[ignore = "it states, and demands nothing: caustics are the hard case"]
+#[ignore = "minutes"]
 fn a_hundred_caustics() {
-    stopped_early(&CAUSTIC, 100);
+    hundred(&CAUSTIC);
+}
+
+/// Light that comes from a spot which few paths find.
+#[test]
+#[ignore = "ten minutes"]
+fn a_hundred_pictures_of_rare_light() {
+    hundred(&Case {
+        name: "sparse_spot",
+        size: [32, 24],
+        target: 0.05,
+        reference: 2_000_000,
+    });
+}
+
+#[test]
+#[ignore = "minutes"]
+fn a_hundred_pictures_of_spheres_in_the_open() {
+    hundred(&Case {
+        name: "ten_matt",
+        size: [32, 24],
+        target: 0.02,
+        reference: 200_000,
+    });
 }

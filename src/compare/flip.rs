@@ -1,5 +1,5 @@
 //! FLIP: the difference per pixel that an observer sees who flips between two pictures, from 0 (none) to 1 (largest)
-//! [Andersson2020].
+//! \[Andersson2020\].
 //!
 //! Implemented here because the only crate for it wraps a C++ library, so that building this program would need a C++
 //! compiler. The tests compare it with the authors' implementation.

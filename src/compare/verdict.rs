@@ -7,7 +7,7 @@
 //!
 //! *Large blocks* have [`SIGNED_SIDE`] or more pixels per side. For two pictures of the same scene with equal sample counts,
 //! the signs of the d are independent fair coins for any noise. Given the magnitudes, Σ d / √Σ d² then has tails at
-//! most [`BENTKUS`] times those of the normal distribution [Bentkus2015], for any number of pixels and any
+//! most [`BENTKUS`] times those of the normal distribution \[Bentkus2015\], for any number of pixels and any
 //! tails of the noise. The denominator is at least √Σ v. This matters for unequal sample counts, if the picture with fewer
 //! samples missed rare bright ones. Every such block is tested twice: as it is ([`Kind::Mean`]), and with each
 //! pixel divided by the noise of the pixels around it ([`Kind::Standardised`]). The coins stay fair, since

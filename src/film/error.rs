@@ -8,7 +8,7 @@
 //! **Y** must not be estimated from the pixel alone. Where light is rare, most pixels have not found any, and a pixel with one
 //! bright sample divides that sample's error by that sample. So Y is the mean of a *pool*: the smallest square around the pixel in
 //! which the light has come from at least [`ENOUGH`] samples. The number of samples that carry a sum is (Σ y)² / Σ y², after
-//! Kish [Kish1965]: for n equal samples it is n. A pixel whose own light has come from so many samples stands for itself.
+//! Kish \[Kish1965\]: for n equal samples it is n. A pixel whose own light has come from so many samples stands for itself.
 //!
 //! A pool holds only pixels that may be as bright as the pixel itself. Otherwise a lamp would hide the noise of the wall beside
 //! it, and a black background would exaggerate the noise of an edge. If the light of two pixels comes in samples of size a (which

@@ -9,7 +9,7 @@
 use super::{Film, REPLICATES, replicate_counts};
 use rayon::prelude::*;
 
-/// A pixel shares its error if its light has come from fewer samples than this, after Kish [Kish1965]: from none or one.
+/// A pixel shares its error if its light has come from fewer samples than this, after Kish \[Kish1965\]: from none or one.
 const FEW: f64 = 2.0;
 
 /// Samples that must carry the light of those that share.

@@ -60,7 +60,7 @@ const MATERIALS: [(&str, &str); 5] = [
     ),
 ];
 
-/// Uniform numbers in [0, 1), one for each of `count` things and purposes [Steele2014].
+/// Uniform numbers in [0, 1), one for each of `count` things and purposes \[Steele2014\].
 fn uniform(seed: u32, i: usize, purpose: u64) -> f64 {
     let mut z = (u64::from(seed) << 32 ^ i as u64)
         .wrapping_mul(8)

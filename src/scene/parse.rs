@@ -1,4 +1,4 @@
-//! Reads scene files: TOML with spans, then [`format`](super::format)'s rules, then what holds
+//! Reads scene files: TOML with spans, then [`format`]'s rules, then what holds
 //! between tables. Every independent error is reported, with its place.
 
 use super::format::{self, ShapeKind, Table};

@@ -159,7 +159,7 @@ fn a_lamp_does_not_hide_the_noise_of_the_wall_beside_it() {
 #[test]
 fn a_black_background_does_not_exaggerate_the_noise_of_an_edge() {
     let source = |x: u32, y: u32| {
-        let inside = (x / 3 + y / 3) % 2 == 0;
+        let inside = (x / 3 + y / 3).is_multiple_of(2);
         Source {
             base: 0.0,
             flash: if inside { 2.0 } else { 0.0 },

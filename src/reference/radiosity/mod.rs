@@ -1,7 +1,7 @@
 //! Radiosity in a box of six diffuse walls with disk lights flush on them. It is a check on the path tracers, and shares no method
 //! with them.
 //!
-//! The walls are cut into patches, and B = E + ρ Σ F B is solved for their mean radiosities [Goral1984]. The radiance of a point is
+//! The walls are cut into patches, and B = E + ρ Σ F B is solved for their mean radiosities \[Goral1984\]. The radiance of a point is
 //! then gathered from that solution. Direct light and the form factors from points are closed forms ([`form_factor`]). Lights
 //! absorb what falls on them. A patch that a light covers in part reflects with the rest of its area. The error that remains comes from
 //! patches of constant radiosity, and is proportional to their area.
