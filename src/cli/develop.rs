@@ -2,7 +2,7 @@
 
 use super::args::DevelopArgs;
 use super::failure::Failure;
-use super::files::Files;
+use super::files::{Files, Written};
 use super::progress::Progress;
 use crate::output::Format;
 use crate::output::store;
@@ -24,13 +24,15 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     let steps = 1 + args.output.len();
     progress.step(0, steps, &args.film.display().to_string());
     let (film, provenance) = store::load(&args.film)?;
+    let mut written = Written::default();
     for (done, (format, path)) in formats.iter().zip(&args.output).enumerate() {
         progress.step(1 + done, steps, &path.display().to_string());
-        format.write(path, &film, &provenance, args.exposure)?;
-        if !args.talk.quiet {
-            progress.say(&format!("wrote {}", path.display()));
-        }
+        let result = format.write(path, &film, &provenance, args.exposure);
+        written.note(path, result);
     }
     progress.finish();
-    Ok(())
+    if let Some(list) = written.list().filter(|_| !args.talk.quiet) {
+        progress.say(&format!("wrote {list}"));
+    }
+    written.end()
 }

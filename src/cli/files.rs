@@ -174,6 +174,37 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     Ok(atomic::replace(path, |f| f.write_all(text.as_bytes()))?)
 }
 
+/// What a command has written at its end, and what it could not write. An output that can't be written takes no other with it.
+#[derive(Default)]
+pub struct Written {
+    paths: Vec<String>,
+    failures: Vec<Failure>,
+}
+
+impl Written {
+    /// Notes how writing `path` went.
+    pub fn note<E: Into<Failure>>(&mut self, path: &Path, result: Result<(), E>) {
+        match result {
+            Ok(()) => self.paths.push(path.display().to_string()),
+            Err(e) => self.failures.push(e.into()),
+        }
+    }
+
+    /// The files that were written, for a message; `None` if there are none.
+    pub fn list(&self) -> Option<String> {
+        (!self.paths.is_empty()).then(|| self.paths.join(", "))
+    }
+
+    /// Prints every failure. The exit status is that of the first.
+    pub fn end(self) -> Result<(), Failure> {
+        self.failures.iter().for_each(Failure::print);
+        match self.failures.first() {
+            Some(first) => Err(Failure::Said(first.status())),
+            None => Ok(()),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

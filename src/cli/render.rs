@@ -2,7 +2,7 @@
 
 use super::args::{Backend, RenderArgs};
 use super::failure::Failure;
-use super::files::{Files, write_text};
+use super::files::{Files, Written, write_text};
 use super::plan;
 use super::progress::{Progress, clock, describe};
 use super::saver::{Saver, longest_call};
@@ -143,26 +143,21 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     // Save the film however the run ended. Write pictures only if the run did not fail, but even if the film could not be
     // saved: then they are the only result.
     let provenance = saver.provenance(&film, &tally);
-    let mut written = Vec::new();
-    let mut saved = Ok(());
+    let mut written = Written::default();
     if let Some(path) = args.film.as_ref().filter(|_| tally.counters.paths > 0) {
-        saved = store::save(path, &film, &provenance);
-        if saved.is_ok() {
-            written.push(path.display().to_string());
-        }
+        written.note(path, store::save(path, &film, &provenance));
     }
-    let reason = match (ended, &saved) {
-        (Err(failure), Err(e)) => {
-            say!("warning: {e}");
+    let reason = match ended {
+        Ok(reason) => reason,
+        Err(failure) => {
+            let _ = written.end();
             return Err(failure);
         }
-        (ended, _) => ended?,
     };
     if !film.coverage.is_empty() {
         for path in outputs.iter().chain(&args.watch) {
             let format = Format::from_path(path).map_err(Failure::Input)?;
-            format.write(path, &film, &provenance, args.exposure)?;
-            written.push(path.display().to_string());
+            written.note(path, format.write(path, &film, &provenance, args.exposure));
         }
     }
     if let Some(path) = &args.report {
@@ -178,10 +173,13 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             },
             counters: tally.counters,
         };
-        write_text(path, &Report::new(facts, &film, &provenance).to_json())?;
+        let json = Report::new(facts, &film, &provenance).to_json();
+        if let Err(e) = write_text(path, &json) {
+            written.note(path, Err(e));
+        }
     }
     if !args.talk.quiet {
-        say_end(&film, &provenance, &tally, reason, &written);
+        say_end(&film, &provenance, &tally, reason, written.list());
     }
     warn(
         &settings,
@@ -190,7 +188,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         &provenance,
         args.talk.quiet,
     );
-    saved?;
+    written.end()?;
     match reason {
         StopReason::Interrupted => Err(Failure::Interrupted {
             signal: signals.number(),
@@ -343,7 +341,7 @@ fn say_end(
     provenance: &Provenance,
     tally: &Tally,
     reason: StopReason,
-    written: &[String],
+    written: Option<String>,
 ) {
     let mut text = String::new();
     if reason == StopReason::Interrupted {
@@ -363,7 +361,9 @@ fn say_end(
         text += &format!(", {error}");
     }
     say!("{text}");
-    say!("wrote {}", written.join(", "));
+    if let Some(list) = written {
+        say!("wrote {list}");
+    }
 }
 
 /// If fewer paths than this share are truncated, the picture is not visibly darker, so only the report gives their number.

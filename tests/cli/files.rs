@@ -206,3 +206,24 @@ fn a_read_only_film_is_not_resumed() {
     assert!(fs::read(bench.path("f.npz")).unwrap() == before);
     bench.run("develop f.npz -o b.png").success();
 }
+
+/// A device that is always full stands for a full disk.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_takes_no_other_with_it() {
+    let bench = Bench::new();
+    std::os::unix::fs::symlink("/dev/full", bench.path("full.exr")).unwrap();
+    let full = || says("full.exr: cannot write: no space left on device");
+    bench
+        .run("render box.toml --backend cpu --spp 2 --film f.npz -o full.exr -o ok.png --report r.json")
+        .code(4)
+        .stderr(full().and(says("wrote f.npz, ok.png")));
+    for name in ["f.npz", "ok.png", "r.json"] {
+        assert!(bench.path(name).exists(), "{name}");
+    }
+    bench
+        .run("develop f.npz -o full.exr -o later.png")
+        .code(4)
+        .stderr(full().and(says("wrote later.png")));
+    assert!(bench.path("later.png").exists());
+}
