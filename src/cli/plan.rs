@@ -149,7 +149,10 @@ pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
         }
     }
     if let Some(error) = args.error {
-        conditions.push(format!("relative error {}", percent(error)));
+        conditions.push(format!(
+            "relative error {} (uncertainty included)",
+            percent(error)
+        ));
     }
     if let Some(time) = args.time {
         conditions.push(format!("{} of rendering time", clock(time.as_secs_f64())));

@@ -84,14 +84,14 @@ impl RelativeError {
         }
     }
 
-    /// The error that is compared with a wanted one: if it is uncertain by more than a tenth, the error plus twice its uncertainty.
-    /// `None` while it is not known, and while parts of the picture have found no light.
+    /// The error that is compared with a wanted one: the error plus its uncertainty, or plus twice its uncertainty if that is more
+    /// than a tenth. `None` while it is not known, and while parts of the picture have found no light.
     pub fn upper(&self) -> Option<f64> {
         let (value, uncertainty) = (self.value?, self.uncertainty?);
         match self.doubt {
             Some(Doubt::NoLight | Doubt::Unlit(_)) => None,
             _ if uncertainty > MOST_UNCERTAIN * value => Some(value + 2.0 * uncertainty),
-            _ => Some(value),
+            _ => Some(value + uncertainty),
         }
     }
 }
