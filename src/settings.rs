@@ -61,6 +61,68 @@ pub struct Overrides {
     pub integrator: Option<Integrator>,
 }
 
+impl Overrides {
+    /// These, and for what they leave open those of `held`, but for what `changed` has: values that a scene file has got since.
+    pub fn or_held(&self, held: &Settings, changed: &Changed) -> Self {
+        let unless = |changed: bool, value: u32| (!changed).then_some(value);
+        let size = (!changed.size).then_some(held.size);
+        Self {
+            size: self.size.or(size),
+            max_depth: self.max_depth.or(unless(changed.max_depth, held.max_depth)),
+            strata: self.strata.or(unless(changed.strata, held.strata)),
+            seed: self.seed.or(unless(changed.seed, held.seed)),
+            shadow_rays: self.shadow_rays.or(Some(held.shadow_rays)),
+            light: self.light.or(Some(held.light)),
+            integrator: self.integrator.or(Some(held.integrator)),
+        }
+    }
+
+    /// The flags whose values differ from `held`.
+    pub fn against(&self, held: &Settings) -> Vec<&'static str> {
+        let all = [
+            ("--size", self.size.is_some_and(|x| x != held.size)),
+            (
+                "--max-depth",
+                self.max_depth.is_some_and(|x| x != held.max_depth),
+            ),
+            ("--strata", self.strata.is_some_and(|x| x != held.strata)),
+            ("--seed", self.seed.is_some_and(|x| x != held.seed)),
+            (
+                "--shadow-rays",
+                self.shadow_rays.is_some_and(|x| x != held.shadow_rays),
+            ),
+            ("--light", self.light.is_some_and(|x| x != held.light)),
+            (
+                "--integrator",
+                self.integrator.is_some_and(|x| x != held.integrator),
+            ),
+        ];
+        all.into_iter().filter(|f| f.1).map(|f| f.0).collect()
+    }
+}
+
+/// Which hints of a scene file differ from those of an older version of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[expect(missing_docs, reason = "the fields are the hints")]
+pub struct Changed {
+    pub size: bool,
+    pub max_depth: bool,
+    pub strata: bool,
+    pub seed: bool,
+}
+
+impl Changed {
+    /// From `old` to `new`.
+    pub fn between(old: &Scene, new: &Scene) -> Self {
+        Self {
+            size: old.camera.resolution != new.camera.resolution,
+            max_depth: old.render.max_depth != new.render.max_depth,
+            strata: old.render.strata != new.render.strata,
+            seed: old.render.seed != new.render.seed,
+        }
+    }
+}
+
 /// The resolved choices. Together with the scene they fix every sample's value.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Settings {

@@ -54,7 +54,28 @@ pub fn check_bounds(path: &Path, film: &Film, bounds: Rect) -> Result<(), Failur
     )))
 }
 
-/// Refuses to resume an adaptive film without `--adaptive` or with other regions, and any other film with `--adaptive`.
+/// The arguments, completed with what a film that is resumed brings along: its regions, and whether it is adaptive.
+pub fn as_film(args: &RenderArgs, film: &Film) -> Result<RenderArgs, Failure> {
+    let mut args = args.clone();
+    if film.pilot.is_some() && args.samples.is_some() {
+        let message = "--samples can't be used with an adaptive film";
+        return Err(Failure::Input(message.into()));
+    }
+    args.adaptive |= film.pilot.is_some();
+    if args.region.is_empty() && film.bounds != Rect::whole(film.size) {
+        let cells: Vec<Rect> = film.coverage.cells().map(|c| c.0).collect();
+        // If the first run ended before all regions had samples, the film knows only the rectangle around them.
+        let all_begun = cells.iter().copied().reduce(|a, b| a.union(&b)) == Some(film.bounds);
+        args.region = match &film.pilot {
+            Some(pilot) => pilot.regions().to_vec(),
+            None if all_begun => Rect::disjoint(&cells),
+            None => vec![film.bounds],
+        };
+    }
+    Ok(args)
+}
+
+/// Refuses to resume an adaptive film with other regions, and any other film with `--adaptive`.
 pub fn check_adaptive(
     args: &RenderArgs,
     path: &Path,
@@ -62,7 +83,6 @@ pub fn check_adaptive(
     regions: &[Rect],
 ) -> Result<(), Failure> {
     let problem = match &film.pilot {
-        Some(_) if !args.adaptive => "this film is adaptive: resume it with --adaptive",
         None if args.adaptive => "this film is not adaptive: resume it without --adaptive",
         Some(pilot) if !pilot.is_for(regions) => {
             "this adaptive film has other regions: resume it with the same --region flags"

@@ -26,7 +26,7 @@ use crate::render::backend::{self, Chosen};
 use crate::render::{self, memory};
 use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::{Canonical, Scene, check, parse};
-use crate::settings::Settings;
+use crate::settings::{Changed, Settings};
 use crate::stats::percent;
 use crate::world::World;
 use std::path::{Path, PathBuf};
@@ -52,17 +52,19 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     for path in &scene.row_files {
         files.reads("a table of the scene", path)?;
     }
-    let mut settings = Settings::resolve(&scene, &args.overrides());
     let _lock = args.film.as_deref().map(Lock::new).transpose()?;
     if let Some(path) = &args.film {
         stages.begin(format!("reading {}", path.display()));
     }
     let old = load_film(args)?;
-    if let Some((_, provenance)) = &old
-        && args.seed.is_none()
-    {
-        settings.seed = provenance.settings.seed;
-    }
+    let args = &match &old {
+        Some((film, _)) => plan::as_film(args, film)?,
+        None => args.clone(),
+    };
+    let settings = match &old {
+        Some((_, held)) => resumed(args, &scene, held),
+        None => Settings::resolve(&scene, &args.overrides()),
+    };
     let regions = plan::regions(args, &settings)?;
     let bounds = render::plan::bounds(&regions);
     let things = plan::things(&scene);
@@ -73,7 +75,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     stages.end();
     let (mut film, provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
-            check_same_samples(path, &held, &new)?;
+            check_same_samples(args, path, &held, &new)?;
             plan::check_bounds(path, &film, bounds)?;
             plan::check_adaptive(args, path, &film, &regions)?;
             (film, held)
@@ -257,10 +259,34 @@ fn load_film(args: &RenderArgs) -> Result<Option<(Film, Provenance)>, Failure> {
     }
 }
 
-/// Refuses a film whose samples differ from those of this command, and says why.
-fn check_same_samples(path: &Path, held: &Provenance, new: &Provenance) -> Result<(), Failure> {
+/// The settings of a film that is resumed, but for what flags say, and for what the scene file has got since.
+fn resumed(args: &RenderArgs, scene: &Scene, held: &Provenance) -> Settings {
+    let before = parse::parse_str(&args.scene, &held.scene_text);
+    let changed = before.map_or(Changed::default(), |old| Changed::between(&old, scene));
+    let flags = args.overrides().or_held(&held.settings, &changed);
+    let settings = Settings::resolve(scene, &flags);
+    Settings {
+        max_depth_is_default: held.settings.max_depth_is_default && args.max_depth.is_none(),
+        ..settings
+    }
+}
+
+/// Refuses a film whose samples differ from those of this command, and says why and what to type.
+fn check_same_samples(
+    args: &RenderArgs,
+    path: &Path,
+    held: &Provenance,
+    new: &Provenance,
+) -> Result<(), Failure> {
     held.same_samples(new).map_err(|differ| {
-        let message = format!("this film can't be resumed; film and command line: {differ}");
+        let flags = args.overrides().against(&held.settings);
+        let advice = if flags.is_empty() {
+            "give the scene of the film, or name another film".to_owned()
+        } else {
+            format!("leave out {}, or name another film", flags.join(" and "))
+        };
+        let message =
+            format!("this film can't be resumed; film and command line: {differ}; {advice}");
         FileError::content(path, message).into()
     })
 }

@@ -87,6 +87,11 @@ impl Pilot {
         }
     }
 
+    /// The pixels that it is for, disjoint.
+    pub fn regions(&self) -> &[Rect] {
+        &self.regions
+    }
+
     /// Whether it is for the same pixels.
     pub fn is_for(&self, regions: &[Rect]) -> bool {
         self.regions == Rect::disjoint(regions)

@@ -167,7 +167,11 @@ fn a_film_of_another_scene_is_refused_and_untouched() {
                 "render box.toml --backend cpu --spp 8 --film f.npz {flags}"
             ))
             .code(2)
-            .stderr(says("f.npz").and(says(what)));
+            .stderr(says("f.npz").and(says(what)))
+            .stderr(says(&format!(
+                "leave out {}, or name another film",
+                flags.split(' ').next().unwrap()
+            )));
     }
     fs::write(bench.path("other.toml"), SCENE.replace("0.45", "0.46")).unwrap();
     bench
@@ -188,9 +192,47 @@ fn a_film_of_a_region_refuses_other_regions() {
     let bench = Bench::new();
     bench.render("--spp 4 --region 0,0,8,8 --film f.npz -o a.png");
     bench
-        .run("render box.toml --backend cpu --spp 8 --film f.npz")
+        .run("render box.toml --backend cpu --spp 8 --film f.npz --region 4,4,12,12")
         .code(2)
         .stderr(says("0,0,8,8"));
+}
+
+/// A film brings its settings along: nothing needs to be said twice.
+#[test]
+fn a_film_is_resumed_without_its_flags() {
+    let bench = Bench::new();
+    let flags =
+        "--size 20x14 --seed 7 --strata 1 --max-depth 3 --light direct,indirect --shadow-rays 2";
+    for more in [
+        "",
+        " --adaptive",
+        " --region 2,3,9,8",
+        " --region 2,3,9,8 --region 12,9,15,12",
+        " --region 2,3,9,8 --adaptive",
+    ] {
+        bench.render(&format!("--spp 64 {flags}{more} --film whole.npz -o a.png"));
+        bench.render(&format!("--spp 20 {flags}{more} --film f.npz -o a.png"));
+        bench.render("--spp 64 --film f.npz -o a.png");
+        let [whole, resumed] = ["whole.npz", "f.npz"].map(|f| bench.film(f));
+        assert!(whole == resumed, "{more}");
+        for film in ["whole.npz", "f.npz"] {
+            fs::remove_file(bench.path(film)).unwrap();
+        }
+    }
+}
+
+/// What the scene file says since is not passed over.
+#[test]
+fn a_changed_scene_file_does_not_resume_another_film() {
+    let bench = Bench::new();
+    bench.render("--spp 4 --film f.npz -o a.png");
+    let changed = SCENE.replace("resolution = [24, 16]", "resolution = [12, 8]");
+    assert_ne!(changed, SCENE);
+    fs::write(bench.path("changed.toml"), changed).unwrap();
+    bench
+        .run("render changed.toml --backend cpu --spp 8 --film f.npz")
+        .code(2)
+        .stderr(says("size is 24x16 and 12x8"));
 }
 
 #[test]

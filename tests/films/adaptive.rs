@@ -57,8 +57,8 @@ fn conflicting_arguments_are_refused() {
         .success();
     for (command, text) in [
         (
-            format!("{plain} --spp 80 --film f.npz"),
-            "this film is adaptive: resume it with --adaptive",
+            format!("{plain} --samples 0..9 --film f.npz"),
+            "--samples can't be used with an adaptive film",
         ),
         (
             format!("{RENDER} --spp 80 --film g.npz"),

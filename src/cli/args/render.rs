@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// `etendue render`.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 Examples:
   etendue render scenes/three_materials.toml
@@ -91,15 +91,9 @@ pub struct RenderArgs {
     /// Which light to keep, separated by commas: emitted (not scattered), direct (scattered once), indirect (scattered twice or more) [default: all]
     #[arg(long, value_name = "LIST", value_parser = values::light, allow_hyphen_values = true, help_heading = "What to render")]
     pub light: Option<LightParts>,
-    /// path is full path tracing; whitted follows mirrors and glass, with only direct light on other surfaces
-    #[arg(
-        long,
-        value_enum,
-        default_value = "path",
-        value_name = "NAME",
-        help_heading = "What to render"
-    )]
-    pub integrator: IntegratorName,
+    /// path is full path tracing; whitted follows mirrors and glass, with only direct light on other surfaces [default: path]
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "What to render")]
+    pub integrator: Option<IntegratorName>,
     /// Light samples per path vertex, over all lights together [default: chosen from the scene]
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, MAX_SHADOW_RAYS.into()), allow_hyphen_values = true,
           help_heading = "What to render")]
@@ -123,7 +117,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME", value_parser = values::part_of_name, help_heading = "Device")]
     pub adapter: Option<String>,
 
-    /// Accumulate samples in this film (.npz): create it, or resume it if it exists
+    /// Accumulate samples in this film (.npz): create it, or resume it with its own settings if it exists
     #[arg(long, value_name = "FILE", help_heading = "Films")]
     pub film: Option<PathBuf>,
     /// How often to save the film during the run [default: 60s]
@@ -154,7 +148,7 @@ impl RenderArgs {
             seed: self.seed,
             shadow_rays: self.shadow_rays,
             light: self.light,
-            integrator: Some(match self.integrator {
+            integrator: self.integrator.map(|name| match name {
                 IntegratorName::Path => Integrator::Path,
                 IntegratorName::Whitted => Integrator::Whitted,
             }),
