@@ -125,8 +125,13 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
     };
     let samples = match find("samples").map(|c| &c.sample_data) {
         Some(FlatSamples::U32(counts)) if counts.len() == rgb.len() => Some(counts.clone()),
+        Some(FlatSamples::F32(counts))
+            if counts.len() == rgb.len() && counts.iter().all(is_count) =>
+        {
+            Some(counts.iter().map(|n| *n as u32).collect())
+        }
         Some(_) => {
-            let what = "channel samples does not have an unsigned integer for each pixel";
+            let what = "channel samples does not have a whole number for each pixel";
             return Err(invalid(what.into()));
         }
         None => None,
@@ -152,6 +157,11 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
         samples,
         attributes,
     })
+}
+
+/// Whether it can be a number of samples.
+fn is_count(n: &f32) -> bool {
+    n.fract() == 0.0 && (0.0..=u32::MAX as f32).contains(n)
 }
 
 fn utf8(text: &Text) -> String {
@@ -275,6 +285,9 @@ mod tests {
         let mut counted = rgb(1.0);
         counted.push(("samples", integers.clone()));
         assert_eq!(foreign(&counted).unwrap().samples, Some(vec![1, 2]));
+        counted.pop();
+        counted.push(("samples", FlatSamples::F32(vec![3.0, 4.0])));
+        assert_eq!(foreign(&counted).unwrap().samples, Some(vec![3, 4]));
         for (channels, expected) in [
             (rgb(f32::NAN), "channel R is NaN at pixel (1, 0)"),
             (rgb(f32::INFINITY), "channel R is inf at pixel (1, 0)"),
@@ -285,7 +298,7 @@ mod tests {
             (errors(&all[1..], 0.5), "only some of the error channels"),
             (
                 errors(&["samples"], 0.5),
-                "channel samples does not have an unsigned",
+                "channel samples does not have a whole number",
             ),
             (vec![("Y", floats(1.0))], "no channel R; it has Y"),
             (
