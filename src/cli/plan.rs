@@ -170,7 +170,7 @@ pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
     }
     if let Some(error) = args.error {
         conditions.push(format!(
-            "relative error {} (uncertainty included)",
+            "relative error {} (plus twice its uncertainty)",
             percent(error)
         ));
     }

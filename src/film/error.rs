@@ -12,14 +12,14 @@
 //!
 //! A pool holds only pixels that may be as bright as the pixel itself. Otherwise a lamp would hide the noise of the wall beside
 //! it, and a black background would exaggerate the noise of an edge. If the light of two pixels comes in samples of size a (which
-//! adds a/n to the mean), the difference of their means has the variance a (Y₁ + Y₂) / n. Two pixels are compatible if the
-//! difference is at most [`COMPATIBLE`] of these standard deviations.
+//! adds a/n to the mean), the difference of their means has the variance a (Y₁ + Y₂) / n. Other pixels of a pool are darker by
+//! at most [`DARKER`] of these standard deviations, or brighter by at most [`BRIGHTER`]. Where it is known, pixels whose paths
+//! have all met nothing are left out.
 //!
 //! The **uncertainty** of the relative error E has three parts, which are relative variances of E². The terms c of pixels are
 //! independent, and as few as they are uneven: Σ c² / (Σ c)². The means of the pools have the relative variance 1 / carriers, and
 //! count twice; pixels that share a pool share its error. The same holds for Ȳ.
 
-use super::reached::Reached;
 use super::{Film, REPLICATES, replicate_counts};
 use crate::stats::{luminance, percent, percent_to};
 use rayon::prelude::*;
@@ -28,8 +28,11 @@ use std::fmt;
 /// Samples that must carry the light of a pool. Its mean then has a relative error of about 1/4.
 const ENOUGH: f64 = 16.0;
 
-/// Standard deviations by which the means of two pixels of one pool may differ.
-const COMPATIBLE: f64 = 2.0;
+/// Standard deviations by which another pixel of the pool may be darker than its own pixel.
+const DARKER: f64 = 2.0;
+
+/// The same, brighter. Less: beside a bright thing there are many brighter pixels, and they would hide noise.
+const BRIGHTER: f64 = 1.0;
 
 /// Radii of the squares that are tried, in pixels. Beyond the last one, the mean of the picture is taken if it is less than the
 /// pool's.
@@ -41,7 +44,10 @@ const MOST_UNCERTAIN: f64 = 0.10;
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
 const EVEN: f64 = 5.0 / 3.0;
 
-/// The largest share of pixels without light that counts as chance.
+/// A pixel is unlit if there is no light within so many pixels of it, across and down.
+const AROUND: usize = 4;
+
+/// The largest share of unlit pixels that counts as chance.
 const MOST_UNLIT: f64 = 0.01;
 
 /// An estimate of a picture's relative error.
@@ -84,14 +90,12 @@ impl RelativeError {
         }
     }
 
-    /// The error that is compared with a wanted one: the error plus its uncertainty, or plus twice its uncertainty if that is more
-    /// than a tenth. `None` while it is not known, and while parts of the picture have found no light.
+    /// The error that is compared with a wanted one: the error plus twice its uncertainty. `None` while it is not known, and while
+    /// parts of the picture have found no light.
     pub fn upper(&self) -> Option<f64> {
-        let (value, uncertainty) = (self.value?, self.uncertainty?);
         match self.doubt {
             Some(Doubt::NoLight | Doubt::Unlit(_)) => None,
-            _ if uncertainty > MOST_UNCERTAIN * value => Some(value + 2.0 * uncertainty),
-            _ => Some(value + uncertainty),
+            _ => Some(self.value? + 2.0 * self.uncertainty?),
         }
     }
 }
@@ -154,13 +158,14 @@ impl Light {
         carriers(self.sum, self.squares)
     }
 
-    /// Whether this pixel and `other` may be equally bright.
+    /// Whether `other` may be as bright as this pixel.
     fn compatible(&self, other: &Self) -> bool {
         let size = (self.squares + other.squares) / (self.sum + other.sum);
         let (a, b) = (self.mean(), other.mean());
         // Each mean has the variance size * mean / n.
         let variance = size * (a / self.n + b / other.n);
-        (a - b).powi(2) <= COMPATIBLE * COMPATIBLE * variance
+        let most = if b > a { BRIGHTER } else { DARKER };
+        (a - b).powi(2) <= most * most * variance
     }
 }
 
@@ -203,7 +208,7 @@ impl Film {
         }
         let floor = (0.1 * mean).powi(2);
         let width = self.bounds.width();
-        let picture = Square::new(&pixels, width);
+        let picture = Square::new(&pixels, &self.reached, width);
         let terms: Vec<Term> = (0..pixels.len())
             .into_par_iter()
             .map(|i| picture.term(i, mean, floor))
@@ -263,37 +268,38 @@ impl Film {
         pixels
     }
 
-    /// Pixels where paths have met surfaces, but neither they nor their neighbours have found light.
+    /// Pixels where paths have met surfaces, but found no light, nor have the pixels around them.
     fn unlit(&self, pixels: &[Light]) -> u64 {
-        let Some(reached) = &self.reached else {
+        if self.reached.is_empty() {
             return 0;
-        };
-        let mut lit = vec![false; reached.blocks().len()];
-        let width = self.bounds.width() as usize;
-        for (i, _) in pixels.iter().enumerate().filter(|(_, p)| p.sum > 0.0) {
-            let (x, y) = ((i % width) as u32, (i / width) as u32);
-            lit[reached.index(self.bounds.x0 + x, self.bounds.y0 + y)] = true;
         }
-        reached.unlit(&lit, self.coverage.cells().map(|c| c.0))
-    }
-
-    /// Whether a path near pixel (x, y) has met a surface and gone on to look for light.
-    pub fn has_reached(&self, x: u32, y: u32) -> bool {
-        self.reached.as_ref().is_some_and(|r| r.has(x, y))
-    }
-
-    /// Notes that a path of pixel (x, y) has met a surface and gone on to look for light.
-    pub fn reach(&mut self, x: u32, y: u32) {
-        let size = self.size;
-        self.reached
-            .get_or_insert_with(|| Reached::new(size))
-            .note(x, y);
+        let width = self.bounds.width() as usize;
+        let lit: Vec<bool> = pixels.iter().map(|p| p.sum > 0.0).collect();
+        // First along rows, then along columns.
+        let near = |k: usize, n: usize| k.saturating_sub(AROUND)..n.min(k + AROUND + 1);
+        let along: Vec<bool> = (0..lit.len())
+            .into_par_iter()
+            .map(|i| {
+                let row = i / width * width;
+                near(i % width, width).any(|x| lit[row + x])
+            })
+            .collect();
+        let height = lit.len() / width;
+        let dark = |i: &usize| {
+            let (x, y) = (i % width, i / width);
+            pixels[*i].n > 0.0
+                && self.reached[*i] == 1
+                && !near(y, height).any(|y| along[y * width + x])
+        };
+        (0..lit.len()).into_par_iter().filter(dark).count() as u64
     }
 }
 
 /// The pixels of a film, in rows of `width`.
 struct Square<'a> {
     pixels: &'a [Light],
+    /// [`Film::reached`].
+    reached: &'a [u8],
     width: u32,
     height: u32,
 }
@@ -302,9 +308,10 @@ struct Square<'a> {
 type Window = [std::ops::Range<usize>; 2];
 
 impl<'a> Square<'a> {
-    fn new(pixels: &'a [Light], width: u32) -> Self {
+    fn new(pixels: &'a [Light], reached: &'a [u8], width: u32) -> Self {
         Self {
             pixels,
+            reached,
             width,
             height: (pixels.len() / width as usize) as u32,
         }
@@ -344,7 +351,8 @@ impl<'a> Square<'a> {
                     y * self.width as usize + columns.start..y * self.width as usize + columns.end
                 {
                     let p = &self.pixels[k];
-                    if p.n > 0.0 && (k == i || pixel.compatible(p)) {
+                    if k == i || p.n > 0.0 && self.reached.get(k) != Some(&0) && pixel.compatible(p)
+                    {
                         n += p.n;
                         sum += p.sum;
                         squares += p.squares;

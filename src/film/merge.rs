@@ -85,10 +85,14 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
         }
     }
     into.left_out.merge(&other.left_out);
-    match (&mut into.reached, &other.reached) {
-        (Some(into), Some(other)) => into.merge(other),
-        (into @ None, other) => into.clone_from(other),
-        (Some(_), None) => {}
+    if !other.reached.is_empty() {
+        for y in other.bounds.y0..other.bounds.y1 {
+            for x in other.bounds.x0..other.bounds.x1 {
+                if other.has_reached(x, y) {
+                    into.reach(x, y);
+                }
+            }
+        }
     }
     // The pilots of one film say nothing about the sum.
     into.pilot = None;
@@ -130,6 +134,9 @@ fn grow(film: &mut Film, bounds: Rect) {
     move_rows(&mut film.sums, old, bounds);
     if !film.partial.is_empty() {
         move_rows(&mut film.partial, old, bounds);
+    }
+    if !film.reached.is_empty() {
+        move_rows(&mut film.reached, old, bounds);
     }
 }
 

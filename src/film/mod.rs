@@ -13,14 +13,12 @@ mod left_out;
 pub mod merge;
 pub mod pilot;
 mod pooled;
-pub mod reached;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};
 pub use left_out::LeftOut;
 use pilot::Pilot;
 use rayon::prelude::*;
-use reached::Reached;
 use std::mem::take;
 use std::ops::Range;
 
@@ -52,8 +50,9 @@ pub struct Film {
     left_out: LeftOut,
     /// The pilots of an adaptive film (`--adaptive`).
     pub pilot: Option<Pilot>,
-    /// Where paths have met surfaces; `None` if nowhere, or if it is not known.
-    pub reached: Option<Reached>,
+    /// 1 for each pixel of which a path has met a surface and gone on to look for light, in the order of `sums`; empty if there is
+    /// none, or if it is not known. A pixel without light is then either a background, or lit by light that is rarely found.
+    reached: Vec<u8>,
 }
 
 /// The estimate of a pixel.
@@ -82,7 +81,7 @@ impl Film {
             partial: Vec::new(),
             left_out: LeftOut::default(),
             pilot: None,
-            reached: None,
+            reached: Vec::new(),
         }
     }
 
@@ -107,7 +106,7 @@ impl Film {
             partial,
             left_out: LeftOut::default(),
             pilot: None,
-            reached: None,
+            reached: Vec::new(),
         }
     }
 
@@ -216,6 +215,32 @@ impl Film {
     pub fn leave_out(&mut self, x: u32, y: u32, samples: [u64; REPLICATES]) {
         debug_assert!(self.bounds.contains(x, y));
         self.left_out.add(x, y, samples);
+    }
+
+    /// Notes that a path of pixel (x, y) has met a surface and gone on to look for light. Only engines that look for light by chance
+    /// say so: without them (direct light alone, Whitted's integrator), light that no light sample finds is not there.
+    pub fn reach(&mut self, x: u32, y: u32) {
+        if self.reached.is_empty() {
+            self.reached = vec![0; self.sums.len()];
+        }
+        let i = self.index(x, y);
+        self.reached[i] = 1;
+    }
+
+    /// Whether a path of pixel (x, y) has met a surface and gone on to look for light.
+    pub fn has_reached(&self, x: u32, y: u32) -> bool {
+        self.reached.get(self.index(x, y)) == Some(&1)
+    }
+
+    /// 1 for each pixel of which a path has; empty if there is none, or if it is not known.
+    pub(crate) fn reached(&self) -> &[u8] {
+        &self.reached
+    }
+
+    /// Takes what [`reached`](Self::reached) has given; empty, or as long as the sums.
+    pub(crate) fn set_reached(&mut self, reached: Vec<u8>) {
+        assert!(reached.is_empty() || reached.len() == self.sums.len());
+        self.reached = reached;
     }
 
     /// Samples that were not finite.

@@ -29,16 +29,14 @@ impl Film {
     /// The errors of the pixels of the film's bounds that share theirs with their neighbours, row by row; `None` for the others, and
     /// in all where no pixel does.
     pub(crate) fn shared_errors(&self) -> Option<Vec<Option<[f32; 4]>>> {
-        let reached = self.reached.as_ref()?;
+        if self.reached.is_empty() {
+            return None;
+        }
         let width = self.bounds.width() as usize;
         let height = self.bounds.height() as usize;
         let pixels = self.light();
-        let may_share = |i: usize| {
-            let [x, y] = [i % width, i / width].map(|n| n as u32);
-            pixels[i].n >= ENOUGH
-                && pixels[i].carriers() < FEW
-                && reached.has(self.bounds.x0 + x, self.bounds.y0 + y)
-        };
+        let may_share =
+            |i: usize| pixels[i].n >= ENOUGH && pixels[i].carriers() < FEW && self.reached[i] == 1;
         let any = (0..pixels.len())
             .into_par_iter()
             .any(|i| may_share(i) && pixels[i].sum == 0.0);

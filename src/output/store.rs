@@ -17,7 +17,6 @@ use crate::files::atomic;
 use crate::files::{FileError, open};
 use crate::film::coverage::{Coverage, Rect};
 use crate::film::pilot::Pilot;
-use crate::film::reached::Reached;
 use crate::film::{BLOCK, Film, REPLICATES, Sums};
 use crate::provenance::Provenance;
 use crate::scene::LARGEST_STRATA;
@@ -80,7 +79,7 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         block: BLOCK,
         partial: unfinished,
         left_out: left_out.len() as u64,
-        reached: film.reached.is_some(),
+        reached: !film.reached().is_empty(),
         pilot: film.pilot.clone(),
         coverage: film.coverage.clone(),
         provenance: provenance.clone(),
@@ -135,12 +134,12 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
             data: bytemuck::cast_slice(&left_out),
         });
     }
-    if let Some(reached) = &film.reached {
+    if !film.reached().is_empty() {
         arrays.push(Array {
             name: "reached",
             descr: "|u1".into(),
-            shape: Reached::shape(film.size).map(u64::from).to_vec(),
-            data: reached.blocks(),
+            shape: vec![height, width],
+            data: film.reached(),
         });
     }
     atomic::replace(path, |file| npz::write(file, &arrays))
@@ -235,12 +234,13 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
         Vec::new()
     };
     let reached = if header.reached {
-        let shape = Reached::shape(header.size).map(u64::from);
-        let blocks = reader.array("reached", "|u1", &shape, shape[0] * shape[1])?;
-        let reached = Reached::from_blocks(header.size, blocks);
-        Some(reached.ok_or_else(|| Damage::Wrong("\"reached\" holds more than 0 and 1".into()))?)
+        let reached: Vec<u8> = reader.array("reached", "|u1", &[height, width], pixels)?;
+        if reached.iter().any(|r| *r > 1) {
+            return Err(Damage::Wrong("\"reached\" holds more than 0 and 1".into()));
+        }
+        reached
     } else {
-        None
+        Vec::new()
     };
     reader.finish()?;
 
@@ -272,7 +272,7 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
         partial,
     );
     film.pilot = header.pilot;
-    film.reached = reached;
+    film.set_reached(reached);
     for [x, y, samples @ ..] in left_out {
         film.leave_out(x as u32, y as u32, samples);
     }

@@ -67,7 +67,7 @@ pub struct RenderArgs {
     /// Stop after this rendering time (90s, 2m, 1h30m), but not before every pixel has a sample
     #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true, help_heading = "When to stop")]
     pub time: Option<Duration>,
-    /// Stop when the relative error plus its uncertainty is at most E, such as 0.02 or 2%
+    /// Stop when the relative error plus twice its uncertainty is at most E, such as 0.02 or 2%
     #[arg(long, value_name = "E", value_parser = values::relative_error, allow_hyphen_values = true, help_heading = "When to stop")]
     pub error: Option<f64>,
     #[arg(long, value_name = "A..B", value_parser = values::sample_range, allow_hyphen_values = true, help_heading = "When to stop",
