@@ -39,6 +39,17 @@ const SHAPES: [(&str, &str); 5] = [
     ("sphere", "center = [0.0, -1e6, 0.0]\nradius = 999999.0"),
 ];
 
+/// The bits of all shapes, and of all materials.
+const EVERY_SHAPE: usize = (1 << SHAPES.len()) - 1;
+const EVERY_MATERIAL: usize = (1 << MATERIALS.len()) - 1;
+
+#[test]
+fn every_material_of_the_format_is_here() {
+    let schema = etendue::scene::schema::schema();
+    let kinds = &schema["properties"]["material"]["additionalProperties"]["oneOf"];
+    assert_eq!(kinds.as_array().expect("a list").len(), MATERIALS.len());
+}
+
 /// A scene with the shapes and materials whose bits are set, every shape with every material that it may have.
 fn text(shapes: usize, materials: usize, lights: usize, eye_inside: bool) -> Option<String> {
     let mut s = format!(
@@ -106,7 +117,7 @@ fn every_combination_of_primitives_and_materials_is_valid() {
 
 #[test]
 fn every_mode_is_valid() {
-    let everything = scene(&text(31, 15, 3, false).expect("has primitives"));
+    let everything = scene(&text(EVERY_SHAPE, EVERY_MATERIAL, 3, false).expect("has primitives"));
     let only_mirrors = scene(&text(1, 2, 1, false).expect("has primitives"));
     for scene in [&everything, &only_mirrors] {
         for light in 1..8 {
@@ -149,7 +160,7 @@ fn a_kernel_holds_only_what_its_scene_needs() {
     };
     let plane = kernel(text(2, 1, 1, false), None);
     let everything = [Access::Baked, Access::Buffers, Access::Tree]
-        .map(|access| kernel(text(31, 15, 3, false), Some(access)))
+        .map(|access| kernel(text(EVERY_SHAPE, EVERY_MATERIAL, 3, false), Some(access)))
         .concat();
     for unneeded in [
         "fn cylinder_",

@@ -1,4 +1,5 @@
-// Receivers of light in scenes with glossy materials. The lobe affects which light is chosen, and which point on it.
+// Receivers of light in scenes with glossy materials. The lobe affects which light is chosen, and which point on it. Every
+// material but Phong is treated as matt.
 
 // The surface for which a light is chosen: its normal, and how it scatters.
 struct Receiver {

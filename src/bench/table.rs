@@ -151,6 +151,11 @@ fn errors(points: &[Point]) -> String {
         "efficiency",
         "ratio",
     ]);
+    // The uncertainty that the pictures state, not the spread between them.
+    let claimed = |p: &Point| match (p.claimed_relative_error, p.claimed_uncertainty) {
+        (Some(error), Some(by)) => format!("{} \u{b1} {}", percent(error.mean), percent(by.mean)),
+        (error, _) => error.map_or("-".into(), |e| percent(e.mean)),
+    };
     let share = |s: Option<Spread>| s.map_or("-".into(), |s| with_spread(percent(s.mean), s));
     for p in points {
         columns.push(vec![
@@ -162,7 +167,7 @@ fn errors(points: &[Point]) -> String {
             cell(p.trimmed_relative_mse),
             cell(p.flip),
             share(p.true_relative_error),
-            share(p.claimed_relative_error),
+            claimed(p),
             p.efficiency.map_or("-".into(), cell),
             p.ratio.map_or("-".into(), cell),
         ]);

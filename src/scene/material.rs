@@ -127,12 +127,18 @@ impl MaterialKind {
 
     /// Whether it scatters into a few directions only, so that there is nothing to evaluate.
     pub fn is_specular(self) -> bool {
-        matches!(self, Self::Mirror | Self::Dielectric)
+        match self {
+            Self::Mirror | Self::Dielectric => true,
+            Self::Diffuse | Self::Phong => false,
+        }
     }
 
     /// Whether it is sampled by the cosine alone. Light sampling then covers all its directions about as well.
     pub fn is_matt(self) -> bool {
-        matches!(self, Self::Diffuse)
+        match self {
+            Self::Diffuse => true,
+            Self::Mirror | Self::Dielectric | Self::Phong => false,
+        }
     }
 
     /// Its description in the schema.
