@@ -176,6 +176,21 @@ fn failures_leave_a_film_and_a_report() {
     assert!(!f.golden("one.report.html").exists() && !f.golden("one.actual.npz").exists());
 }
 
+/// Something is in the way of the film that a failure leaves: it is a failure all the same.
+#[test]
+fn a_failure_whose_evidence_cannot_be_saved_is_a_failure() {
+    let f = Folder::new(&["ball"]);
+    f.bless();
+    let (film, mut provenance) = render(&BALL.replace("[20.0", "[30.0"), 0, 64);
+    // The golden is of brighter light, under the hash of the scene as it is.
+    provenance.scene_hash = render(BALL, 0, 4).1.scene_hash;
+    write_exr(&f.golden("ball.exr"), &film, &provenance).expect("written");
+    std::fs::create_dir_all(f.golden("ball.actual.npz").join("in the way")).expect("made");
+    f.run(&[])
+        .code(1)
+        .stdout(contains("FAILED  ball").and(contains("its film and page could not be saved: ")));
+}
+
 #[test]
 fn bad_input_never_passes() {
     let f = Folder::new(&[]);

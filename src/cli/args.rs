@@ -106,6 +106,9 @@ pub struct MakeSceneArgs {
     /// `--output`.
     #[arg(short, long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
+    /// Replace files that exist with other contents
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// What `etendue make-scene` makes.

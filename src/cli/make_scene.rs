@@ -3,9 +3,11 @@
 use super::args::{MakeSceneArgs, SceneKind};
 use super::failure::Failure;
 use super::say;
-use crate::files::atomic;
+use crate::files::{FileError, atomic};
 use crate::scene::generate;
+use std::fs;
 use std::io::Write as _;
+use std::path::{Path, PathBuf};
 
 /// Writes a scene with many objects, and the CSV file beside it if it needs one.
 pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
@@ -30,12 +32,33 @@ pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
     let rows = scene.with_extension("csv");
     let name = rows.file_name().unwrap_or_default().to_string_lossy();
     let made: generate::Generated = make(args.count as usize, args.seed, &name);
-    let mut written = vec![scene.display().to_string()];
-    if let Some(text) = &made.rows {
-        atomic::replace(&rows, |f| f.write_all(text.as_bytes()))?;
-        written.push(rows.display().to_string());
+    let rows = made.rows.as_ref().map(|text| (&rows, text));
+    let files: Vec<(&PathBuf, &String)> = rows.into_iter().chain([(&scene, &made.scene)]).collect();
+    if !args.force {
+        for (path, text) in &files {
+            check_not_lost(path, text)?;
+        }
     }
-    atomic::replace(&scene, |f| f.write_all(made.scene.as_bytes()))?;
-    say!("wrote {}", written.join(", "));
+    for (path, text) in &files {
+        atomic::replace(path, |f| f.write_all(text.as_bytes()))?;
+    }
+    let names: Vec<String> = files
+        .iter()
+        .rev()
+        .map(|f| f.0.display().to_string())
+        .collect();
+    say!("wrote {}", names.join(", "));
     Ok(())
+}
+
+/// Refuses to replace a file that someone may have edited: one with other contents.
+fn check_not_lost(path: &Path, text: &str) -> Result<(), Failure> {
+    match fs::read(path) {
+        Ok(old) if old != text.as_bytes() => {
+            let message = "the file exists, and may hold your own work; --force replaces it".into();
+            let path = path.into();
+            Err(FileError::Io { path, message }.into())
+        }
+        _ => Ok(()),
+    }
 }

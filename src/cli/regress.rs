@@ -151,14 +151,24 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
     for d in done {
         let detail = d.outcome.detail(&d.case);
         list += &format!("{:>9}  {}: {detail}\n", d.outcome.word(), d.case.name);
-        if let Outcome::Failed(comparison) = &d.outcome {
+        if let Outcome::Failed {
+            comparison,
+            unsaved,
+        } = &d.outcome
+        {
             for line in comparison.findings_text().lines() {
                 list += &format!("          {line}\n");
             }
+            let evidence = match unsaved {
+                None => format!(
+                    "see {} and {}",
+                    d.case.report_path().display(),
+                    d.case.actual_path().display()
+                ),
+                Some(why) => format!("its film and page could not be saved: {why}"),
+            };
             list += &format!(
-                "          see {} and {}; if the change is intended, re-create the golden with --bless --filter {}\n",
-                d.case.report_path().display(),
-                d.case.actual_path().display(),
+                "          {evidence}; if the change is intended, re-create the golden with --bless --filter {}\n",
                 d.case.name
             );
         }

@@ -377,11 +377,15 @@ fn say_end(
         say!("{text}no samples rendered, no files written");
         return;
     }
-    text += &plan::samples_text(film);
-    text += &format!(" in {}", clock(tally.seconds));
-    if tally.seconds > 0.0 {
-        let speed = tally.counters.paths as f64 / tally.seconds / 1e6;
-        text += &format!(" ({speed:.3} million paths per second)");
+    let samples = plan::samples_text(film);
+    if tally.counters.paths == 0 {
+        text += &format!("the film already holds {samples}; nothing rendered");
+    } else {
+        text += &format!("{samples} in {}", clock(tally.seconds));
+        if tally.seconds > 0.0 {
+            let speed = tally.counters.paths as f64 / tally.seconds / 1e6;
+            text += &format!(" ({speed:.3} million paths per second)");
+        }
     }
     if let Some(error) = describe(&provenance.error(film)) {
         text += &format!(", {error}");

@@ -80,7 +80,12 @@ pub enum Outcome {
     /// The same up to its noise.
     Passed(Box<Comparison>),
     /// Different.
-    Failed(Box<Comparison>),
+    Failed {
+        /// What differs.
+        comparison: Box<Comparison>,
+        /// Why the evidence, a film and a page, could not be saved.
+        unsaved: Option<String>,
+    },
     /// A scene without a golden.
     New,
     /// A golden without a scene.
@@ -98,7 +103,7 @@ impl Outcome {
     pub fn word(&self) -> &'static str {
         match self {
             Outcome::Passed(_) => "passed",
-            Outcome::Failed(_) => "FAILED",
+            Outcome::Failed { .. } => "FAILED",
             Outcome::New => "new",
             Outcome::Orphaned => "orphaned",
             Outcome::Unusable(_) => "unusable",
@@ -115,7 +120,7 @@ impl Outcome {
     /// The result in one line.
     pub fn detail(&self, case: &Case) -> String {
         match self {
-            Outcome::Passed(c) | Outcome::Failed(c) => c.sentence(),
+            Outcome::Passed(c) | Outcome::Failed { comparison: c, .. } => c.sentence(),
             Outcome::New => format!(
                 "{} does not exist; create it with --bless",
                 case.golden_path().display()
@@ -233,8 +238,10 @@ impl Case {
             self.clear();
             Outcome::Passed(Box::new(comparison))
         } else {
-            leave().map_err(text)?;
-            Outcome::Failed(Box::new(comparison))
+            Outcome::Failed {
+                unsaved: leave().err().map(text),
+                comparison: Box::new(comparison),
+            }
         };
         Ok(Some((outcome, [golden, actual])))
     }

@@ -68,7 +68,7 @@ pub fn junit(done: &[Done]) -> String {
             let element = if unusable(d) { "error" } else { "failure" };
             let kind = d.outcome.word().to_lowercase();
             let text = match &d.outcome {
-                Outcome::Failed(comparison) => xml_text(&comparison.report()),
+                Outcome::Failed { comparison, .. } => xml_text(&comparison.report()),
                 _ => String::new(),
             };
             let _ = writeln!(
@@ -104,7 +104,7 @@ pub fn index(done: &[Done], base: &std::path::Path) -> String {
             )
         });
         let report = match d.outcome {
-            Outcome::Failed(_) => {
+            Outcome::Failed { unsaved: None, .. } => {
                 let path = d.case.report_path();
                 let link = path.strip_prefix(base).unwrap_or(&path);
                 let link = html::escape(&link.display().to_string());

@@ -227,3 +227,39 @@ fn an_output_that_cannot_be_written_takes_no_other_with_it() {
         .stderr(full().and(says("wrote later.png")));
     assert!(bench.path("later.png").exists());
 }
+
+/// An edited scene is a person's own work.
+#[test]
+fn make_scene_does_not_replace_an_edited_file() {
+    let bench = Bench::new();
+    for (name, command) in [
+        ("few.toml", "make-scene spheres --count 3 -o few.toml"),
+        ("many.csv", "make-scene spheres --count 300 -o many.toml"),
+    ] {
+        bench.run(command).success();
+        let made = fs::read(bench.path(name)).unwrap();
+        // The same again changes nothing.
+        bench.run(command).success();
+        fs::write(bench.path(name), "mine").unwrap();
+        bench
+            .run(command)
+            .code(4)
+            .stderr(says(name).and(says("--force replaces it")));
+        assert_eq!(fs::read(bench.path(name)).unwrap(), b"mine");
+        bench.run(&format!("{command} --force")).success();
+        assert_eq!(fs::read(bench.path(name)).unwrap(), made);
+    }
+}
+
+#[test]
+fn a_film_that_has_everything_says_so() {
+    let bench = Bench::new();
+    bench.render("--spp 8 --film f.npz -o a.png");
+    bench
+        .run("render box.toml --backend cpu --spp 8 --film f.npz -o b.png")
+        .success()
+        .stderr(says(
+            "the film already holds 8 samples per pixel; nothing rendered",
+        ));
+    assert!(bench.path("b.png").exists());
+}
