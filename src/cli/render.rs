@@ -14,7 +14,7 @@ use crate::files::FileError;
 use crate::files::lock::Lock;
 use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::error::Doubt;
+use crate::film::error::{Doubt, RelativeError};
 use crate::film::pilot::Pilot;
 use crate::gpu::Making;
 use crate::kernel;
@@ -180,16 +180,12 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             written.note(path, Err(e));
         }
     }
+    // This looks at every pixel.
+    let error = provenance.error(&film);
     if !args.talk.quiet {
-        say_end(&film, &provenance, &tally, reason, written.list());
+        say_end(&film, &error, &tally, reason, written.list());
     }
-    warn(
-        &settings,
-        &tally.counters,
-        &film,
-        &provenance,
-        args.talk.quiet,
-    );
+    warn(&settings, &tally.counters, &error, args.talk.quiet);
     written.end()?;
     match reason {
         StopReason::Interrupted => Err(Failure::Interrupted {
@@ -364,7 +360,7 @@ fn stop_reason(args: &RenderArgs, reason: StopReason) -> &'static str {
 /// The last lines: samples, time, speed, error, and the files written.
 fn say_end(
     film: &Film,
-    provenance: &Provenance,
+    error: &RelativeError,
     tally: &Tally,
     reason: StopReason,
     written: Option<String>,
@@ -387,7 +383,7 @@ fn say_end(
             text += &format!(" ({speed:.3} million paths per second)");
         }
     }
-    if let Some(error) = describe(&provenance.error(film)) {
+    if let Some(error) = describe(error) {
         text += &format!(", {error}");
     }
     say!("{text}");
@@ -400,13 +396,7 @@ fn say_end(
 const CUT_SHARE: f64 = 1e-5;
 
 /// Warnings about the picture.
-fn warn(
-    settings: &Settings,
-    counters: &Counters,
-    film: &Film,
-    provenance: &Provenance,
-    quiet: bool,
-) {
+fn warn(settings: &Settings, counters: &Counters, error: &RelativeError, quiet: bool) {
     let share = counters.truncated as f64 / counters.paths.max(1) as f64;
     if share > CUT_SHARE && settings.max_depth_is_default {
         say!(
@@ -419,7 +409,7 @@ fn warn(
         );
     }
     // The report and the picture's header have it too.
-    let doubt = provenance.error(film).doubt.filter(|_| !quiet);
+    let doubt = error.doubt.filter(|_| !quiet);
     match doubt {
         Some(Doubt::NoLight) => say!(
             "warning: no light found yet: the picture is black, and its error is not known; take more samples (--spp, --time), or see: etendue check"
