@@ -9,7 +9,7 @@ use etendue::film::{BLOCK, Film, REPLICATES, Sums};
 use etendue::gpu::pack::pack;
 use etendue::kernel::{Access, compose};
 use etendue::output::store;
-use etendue::output::{write_exr, write_png};
+use etendue::output::{ExrChannels, write_exr, write_png};
 use etendue::provenance::Provenance;
 use etendue::scene::{Scene, parse};
 use etendue::settings::{Overrides, Settings};
@@ -113,7 +113,7 @@ fn relative_error(bencher: Bencher) {
 fn exr_file(bencher: Bencher) {
     let (film, provenance) = film(BLOCK);
     let dir = tempfile::tempdir().expect("a temporary folder");
-    bencher.bench(|| write_exr(&dir.path().join("x.exr"), &film, &provenance));
+    bencher.bench(|| write_exr(&dir.path().join("x.exr"), &film, &provenance, ExrChannels::All));
 }
 
 #[divan::bench]

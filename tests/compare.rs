@@ -7,7 +7,7 @@ use etendue::compare::flip::{PIXELS_PER_DEGREE, flip};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
 use etendue::output::store;
-use etendue::output::{read_exr, write_exr, write_png};
+use etendue::output::{ExrChannels, read_exr, write_exr, write_png};
 use output_support::{Random, described};
 use predicates::prelude::PredicateBooleanExt;
 use predicates::str::contains;
@@ -61,7 +61,7 @@ impl Pictures {
         let path = self.path(name);
         let provenance = described(film);
         match path.extension().and_then(|e| e.to_str()) {
-            Some("exr") => write_exr(&path, film, &provenance),
+            Some("exr") => write_exr(&path, film, &provenance, ExrChannels::All),
             Some("png") => write_png(&path, film, &provenance, 0.0),
             _ => store::save(&path, film, &provenance),
         }

@@ -5,6 +5,7 @@ mod output_support;
 use etendue::files::FileError;
 use etendue::film::coverage::Rect;
 use etendue::film::{Film, REPLICATES};
+use etendue::output::pixels::Pixels;
 use etendue::output::store::{load, save};
 use etendue::provenance::Provenance;
 use output_support::{
@@ -91,6 +92,18 @@ fn numpy_sees_the_same() {
         assert_eq!(arrays["counts"]["dtype"], "<u8");
         assert_eq!(arrays["sums"]["dtype"], "<f8");
         assert_eq!(arrays["sums"]["shape"], json!([h, w, REPLICATES, 4]));
+        // Mean and error need no recipe: they are those of the picture.
+        let pixels = Pixels::new(&film);
+        for y in 0..h {
+            for x in 0..w {
+                let (px, py) = (film.bounds.x0 + x, film.bounds.y0 + y);
+                let e = pixels.at(px, py).unwrap_or_default();
+                let at = |array: &str| &arrays[array]["values"][y as usize][x as usize];
+                let floats = |x: &[f64]| json!(x.iter().map(|v| *v as f32).collect::<Vec<_>>());
+                assert_eq!(*at("mean"), floats(&e.mean), "{px}, {py}");
+                assert_eq!(*at("error"), floats(&e.error), "{px}, {py}");
+            }
+        }
         for y in 0..h {
             for x in 0..w {
                 let i = film.index(film.bounds.x0 + x, film.bounds.y0 + y);

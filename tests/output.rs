@@ -5,7 +5,7 @@ mod output_support;
 use etendue::files::FileError;
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
-use etendue::output::{Format, read_exr, write_exr, write_png};
+use etendue::output::{ExrChannels, Format, WriteOptions, read_exr, write_exr, write_png};
 use output_support::{described, region_film, seen_from_python, whole_film};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ fn an_exr_comes_back() {
     let path = dir.path().join("a.exr");
     for film in [whole_film(), region_film()] {
         let provenance = described(&film);
-        write_exr(&path, &film, &provenance).unwrap();
+        write_exr(&path, &film, &provenance, ExrChannels::All).unwrap();
         let picture = read_exr(&path).unwrap();
         assert_eq!(picture.size, film.size);
         let expected = estimates(&film);
@@ -55,12 +55,44 @@ fn an_exr_comes_back() {
 }
 
 #[test]
+fn viewers_that_know_no_layers_get_r_g_and_b() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.exr");
+    let film = region_film();
+    for (channels, dtype, round) in [
+        (ExrChannels::Rgb, "<f4", (|x| x as f32) as fn(f64) -> f32),
+        // Eleven bits of a half, rounded to the nearest.
+        (ExrChannels::RgbHalf, "<f2", |x| {
+            let unit = 2f64.powi(x.abs().log2().floor() as i32 - 10);
+            if x == 0.0 { 0.0 } else { ((x as f32 as f64 / unit).round_ties_even() * unit) as f32 }
+        }),
+    ] {
+        write_exr(&path, &film, &described(&film), channels).unwrap();
+        let picture = read_exr(&path).unwrap();
+        assert!(picture.error.is_none() && picture.samples.is_none());
+        let expected = estimates(&film);
+        for (i, rgb) in picture.rgb.iter().enumerate() {
+            let at = (i as u32 % 7, i as u32 / 7);
+            let mean = expected.get(&at).copied().unwrap_or_default().mean;
+            assert_eq!(*rgb, mean.map(round), "{at:?}");
+        }
+        let Some(seen) = seen_from_python(&path) else {
+            return;
+        };
+        let names: Vec<&String> = seen["channels"].as_object().unwrap().keys().collect();
+        assert_eq!(names, ["B", "G", "R"]);
+        assert_eq!(seen["channels"]["R"]["dtype"], dtype);
+        assert_eq!(seen["attributes"]["replicates"], json!(4));
+    }
+}
+
+#[test]
 fn openexr_sees_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.exr");
     for film in [whole_film(), region_film()] {
         let provenance = described(&film);
-        write_exr(&path, &film, &provenance).unwrap();
+        write_exr(&path, &film, &provenance, ExrChannels::All).unwrap();
         let Some(seen) = seen_from_python(&path) else {
             return;
         };
@@ -175,13 +207,13 @@ fn overflow_saturates_in_every_channel() {
     let mut film = Film::new([2, 1], rect, 1);
     let bright = [[1e300, 1e39, 1.0, f64::INFINITY]; 4];
     film.put_samples(rect, 0..4, vec![bright; 2]);
-    write_exr(&path, &film, &described(&film)).unwrap();
+    write_exr(&path, &film, &described(&film), ExrChannels::All).unwrap();
     let picture = read_exr(&path).unwrap();
     assert_eq!(picture.rgb[1], [f32::MAX, f32::MAX, 1.0]);
     // One sample: its own second moment is all that is known of the error.
     let mut film = Film::new([2, 1], rect, 1);
     film.put_samples(rect, 0..1, vec![bright; 2]);
-    write_exr(&path, &film, &described(&film)).unwrap();
+    write_exr(&path, &film, &described(&film), ExrChannels::All).unwrap();
     assert_eq!(read_exr(&path).unwrap().error.unwrap()[0][3], f32::MAX);
     write_png(&path.with_extension("png"), &film, &described(&film), 0.0).unwrap();
 }
@@ -191,7 +223,7 @@ fn a_truncated_exr_is_an_error_of_content() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.exr");
     let film = whole_film();
-    write_exr(&path, &film, &described(&film)).unwrap();
+    write_exr(&path, &film, &described(&film), ExrChannels::All).unwrap();
     let good = fs::read(&path).unwrap();
     for end in (0..good.len()).step_by(37) {
         fs::write(&path, &good[..end]).unwrap();
@@ -216,7 +248,7 @@ fn other_kinds_of_files_are_refused() {
     let nowhere = dir.path().join("none/a.exr");
     for format in [Format::Exr, Format::Png] {
         let error = format
-            .write(&nowhere, &film, &described(&film), 0.0)
+            .write(&nowhere, &film, &described(&film), &WriteOptions::default())
             .unwrap_err();
         assert!(error.to_string().contains("no such folder"), "{error}");
     }
@@ -228,7 +260,7 @@ fn a_full_disk_leaves_the_old_picture() {
     let film = whole_film();
     for format in [Format::Exr, Format::Png] {
         let error = format
-            .write(Path::new("/dev/full"), &film, &described(&film), 0.0)
+            .write(Path::new("/dev/full"), &film, &described(&film), &WriteOptions::default())
             .unwrap_err();
         assert!(!error.is_content());
         assert!(error.to_string().contains("no space left"), "{error}");
@@ -243,7 +275,7 @@ fn equal_pictures_are_equal_files() {
     let provenance = described(&film);
     let written = |name: &str| {
         let path = dir.path().join(name);
-        write_exr(&path, &film, &provenance).unwrap();
+        write_exr(&path, &film, &provenance, ExrChannels::All).unwrap();
         fs::read(path).unwrap()
     };
     let first = written("a.exr");

@@ -5,7 +5,7 @@ use etendue::engine::Engine;
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
 use etendue::output::store;
-use etendue::output::{read_exr, write_exr};
+use etendue::output::{ExrChannels, read_exr, write_exr};
 use etendue::provenance::Provenance;
 use etendue::reference::{CpuEngine, Estimator};
 use etendue::regress::assert_golden;
@@ -156,7 +156,7 @@ fn failures_leave_a_film_and_a_report() {
         samples.into(),
     );
     let (_, provenance) = render(BALL, 5, samples.into());
-    write_exr(&f.golden("one.exr"), &film, &provenance).expect("written");
+    write_exr(&f.golden("one.exr"), &film, &provenance, ExrChannels::All).expect("written");
     let junit = f.path("r.xml");
     f.run(&["--junit", junit.to_str().unwrap()])
         .code(1)
@@ -184,7 +184,7 @@ fn a_failure_whose_evidence_cannot_be_saved_is_a_failure() {
     let (film, mut provenance) = render(&BALL.replace("[20.0", "[30.0"), 0, 64);
     // The golden is of brighter light, under the hash of the scene as it is.
     provenance.scene_hash = render(BALL, 0, 4).1.scene_hash;
-    write_exr(&f.golden("ball.exr"), &film, &provenance).expect("written");
+    write_exr(&f.golden("ball.exr"), &film, &provenance, ExrChannels::All).expect("written");
     std::fs::create_dir_all(f.golden("ball.actual.npz").join("in the way")).expect("made");
     f.run(&[])
         .code(1)
@@ -289,7 +289,7 @@ fn a_golden_without_light_is_no_evidence() {
     let (film, mut provenance) = render(&dark, 0, 64);
     provenance.describe(&film);
     std::fs::create_dir_all(f.path("golden")).expect("made");
-    write_exr(&f.golden("one.exr"), &film, &provenance).expect("written");
+    write_exr(&f.golden("one.exr"), &film, &provenance, ExrChannels::All).expect("written");
     f.run(&[])
         .code(2)
         .stdout(contains("unusable  one").and(contains("no evidence")));
@@ -341,7 +341,7 @@ fn the_assertion_says_what_differs_and_how_to_bless() {
         text.contains("no such file") && text.contains("ETENDUE_BLESS=1"),
         "{text}"
     );
-    write_exr(&golden, &film, &provenance).expect("written");
+    write_exr(&golden, &film, &provenance, ExrChannels::All).expect("written");
     let (again, its) = render(BALL, 2, 256);
     assert_golden(&golden, &again, &its);
     let brighter = BALL.replace("20.0, 20.0, 20.0", "24.0, 24.0, 24.0");

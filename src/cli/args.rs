@@ -5,11 +5,12 @@ mod films;
 mod render;
 
 pub use compare::{CompareArgs, RegressArgs};
-pub use films::{DevelopArgs, MergeArgs};
+pub use films::{DevelopArgs, InfoArgs, MergeArgs};
 pub use render::RenderArgs;
 
 use super::bench::args::BenchArgs;
 use super::values;
+use crate::output::{ExrChannels, WriteOptions};
 use crate::scene::generate::MOST_IN_TABLES;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -42,6 +43,8 @@ pub enum Command {
     Check(CheckArgs),
     /// Convert a film to pictures
     Develop(DevelopArgs),
+    /// Show what a film or a picture says of itself
+    Info(InfoArgs),
     /// Merge films of the same scene into one
     Merge(MergeArgs),
     /// Test this adapter on hard cases with known answers
@@ -79,9 +82,31 @@ pub struct Talk {
     /// lines, none is nothing
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto, value_name = "STYLE")]
     pub progress: ProgressStyle,
-    /// Threads for the CPU reference or a software adapter [default: one per core]
+    /// Threads for the CPU reference or a software adapter [default: as many cores as the process may use]
     #[arg(long, value_name = "N", value_parser = values::whole::<u16>(1, 4096), allow_hyphen_values = true)]
     pub threads: Option<u16>,
+}
+
+/// How a command writes pictures.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct PictureArgs {
+    /// Exposure of PNG pictures in stops, applied before the sRGB curve
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = values::exposure,
+          allow_hyphen_values = true)]
+    pub exposure: f64,
+    /// Channels of EXR pictures: all of them, with errors and samples, or R, G and B alone, for programs that don't know layers
+    #[arg(long, value_enum, default_value_t = ExrChannels::All, value_name = "CHANNELS")]
+    pub exr: ExrChannels,
+}
+
+impl PictureArgs {
+    /// The same for the writers.
+    pub fn options(&self) -> WriteOptions {
+        WriteOptions {
+            exposure_stops: self.exposure,
+            exr: self.exr,
+        }
+    }
 }
 
 /// `etendue make-scene`.

@@ -27,7 +27,7 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     let mut written = Written::default();
     for (done, (format, path)) in formats.iter().zip(&args.output).enumerate() {
         progress.step(1 + done, steps, &path.display().to_string());
-        let result = format.write(path, &film, &provenance, args.exposure);
+        let result = format.write(path, &film, &provenance, &args.pictures.options());
         written.note(path, result);
     }
     progress.finish();

@@ -28,8 +28,11 @@ pub(super) fn prepare(command: &Command) {
         }
         _ => None,
     };
-    if let Some(threads) = talk.and_then(|t| t.threads) {
-        // Read by lavapipe.
+    // Read by lavapipe. Its own default is a thread for each core of the machine, also where this process may use fewer of them
+    // (a control group's quota, `taskset`).
+    let threads = talk.and_then(|t| t.threads).map(usize::from);
+    let usable = std::thread::available_parallelism().map(usize::from);
+    if let Some(threads) = threads.or(usable.ok()) {
         set("LP_NUM_THREADS", || Some(threads.to_string().into()));
     }
 }

@@ -1,13 +1,10 @@
 //! The files that a command reads and writes. No output may overwrite an input or another output.
 
 use super::failure::Failure;
-use crate::files::{FileError, atomic};
+use crate::files::{FileError, atomic, resolve};
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-
-/// Most symbolic links that are followed to find where an output leads. Linux has the same limit.
-const MAX_LINKS: usize = 40;
 
 /// Extensions of files that are not films.
 const NOT_FILMS: [&str; 7] = ["exr", "png", "toml", "csv", "json", "html", "svg"];
@@ -85,7 +82,7 @@ impl Files {
             real: if is_stdout(path) && written {
                 path.into()
             } else {
-                real(path)
+                resolve(path)
             },
             written,
         };
@@ -137,28 +134,6 @@ fn check_film_name(what: &str, path: &Path) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
-}
-
-/// The path with all links resolved, also for a file that does not exist yet.
-fn real(path: &Path) -> PathBuf {
-    let mut path = path.to_owned();
-    for _ in 0..MAX_LINKS {
-        if let Ok(real) = fs::canonicalize(&path) {
-            return real;
-        }
-        let folder = match path.parent() {
-            Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
-            _ => ".".into(),
-        };
-        // A link to a file that does not exist yet.
-        if let Ok(to) = fs::read_link(&path) {
-            path = folder.join(to);
-            continue;
-        }
-        let folder = fs::canonicalize(&folder).unwrap_or(folder);
-        return folder.join(path.file_name().unwrap_or_default());
-    }
-    path
 }
 
 /// Whether this name means stdout.

@@ -9,6 +9,7 @@ mod develop;
 mod drivers;
 mod failure;
 mod files;
+mod info;
 mod make_scene;
 mod merge;
 mod plan;
@@ -55,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::render(&args),
         Command::Check(args) => check::check(&args),
         Command::Develop(args) => develop::develop(&args),
+        Command::Info(args) => info::info(&args),
         Command::Merge(args) => merge::merge(&args),
         Command::Selftest(args) => selftest::selftest(&args),
         Command::Compare(args) => compare::compare(&args),

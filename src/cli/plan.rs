@@ -3,6 +3,7 @@
 use super::args::{Backend, RenderArgs};
 use super::failure::Failure;
 use super::progress::clock;
+use crate::engine::DeviceInfo;
 use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
@@ -13,6 +14,7 @@ use crate::settings::Settings;
 use crate::stats::percent;
 use std::ops::Range;
 use std::path::Path;
+use std::time::Duration;
 
 /// Refuses `--adapter` together with `--backend cpu`.
 pub fn check_flags(backend: Backend, adapter: Option<&str>) -> Result<(), Failure> {
@@ -73,6 +75,20 @@ pub fn as_film(args: &RenderArgs, film: &Film) -> Result<RenderArgs, Failure> {
         };
     }
     Ok(args)
+}
+
+/// Rendering time on the CPU reference unless a stop condition is given: 256 samples of an ordinary picture take minutes there.
+const CPU_TIME: Duration = Duration::from_secs(30);
+
+/// The arguments, completed with the stop conditions that are the default on this device.
+pub fn on_device(args: &RenderArgs, device: &DeviceInfo) -> RenderArgs {
+    let mut args = args.clone();
+    let given = args.samples.is_some() || args.error.is_some() || args.time.is_some();
+    if device.backend == "cpu" && !given && args.spp.or(args.rays).is_none() {
+        args.spp = Some(DEFAULT_SPP);
+        args.time = Some(CPU_TIME);
+    }
+    args
 }
 
 /// Refuses to resume an adaptive film with other regions, and any other film with `--adaptive`.

@@ -106,6 +106,8 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         });
     })?;
     stages.end();
+    let time_is_default = args.time.is_none();
+    let args = &plan::on_device(args, chosen.engine.device());
     if let Some(path) = &args.dump_wgsl {
         let wgsl = chosen.wgsl.take();
         let wgsl = wgsl.unwrap_or_else(|| kernel::compose(&world, &settings, None).wgsl);
@@ -159,7 +161,8 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     if !film.coverage.is_empty() {
         for path in outputs.iter().chain(&args.watch) {
             let format = Format::from_path(path).map_err(Failure::Input)?;
-            written.note(path, format.write(path, &film, &provenance, args.exposure));
+            let options = args.pictures.options();
+            written.note(path, format.write(path, &film, &provenance, &options));
         }
     }
     if let Some(path) = &args.report {
@@ -184,6 +187,12 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let error = provenance.error(&film);
     if !args.talk.quiet {
         say_end(&film, &error, &tally, reason, written.list());
+        if reason == StopReason::Time && time_is_default {
+            say!(
+                "note: without a stop condition the CPU reference ends after {}; for more samples: --spp N or --time TIME",
+                clock(args.time.unwrap_or_default().as_secs_f64())
+            );
+        }
     }
     warn(&settings, &tally.counters, &error, args.talk.quiet);
     written.end()?;

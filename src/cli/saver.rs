@@ -64,7 +64,7 @@ impl<'a> Saver<'a> {
         {
             let began = Instant::now();
             let provenance = self.provenance(film, tally);
-            let written = write_png(path, film, &provenance, self.args.exposure);
+            let written = write_png(path, film, &provenance, self.args.pictures.exposure);
             self.watch.done(began, written, progress);
         }
     }

@@ -1,12 +1,10 @@
 //! Pictures to compare: EXR files, films, PNG files, and films in memory.
 
 use crate::files::FileError;
-use crate::files::open;
 use crate::film::Film;
 use crate::output::store;
-use crate::output::{Pixels, entries, read_exr};
+use crate::output::{Kind, Pixels, entries, read_exr, read_png};
 use crate::provenance::Provenance;
-use std::io::{BufReader, Read as _};
 use std::path::Path;
 
 /// A picture and its noise, if known.
@@ -38,33 +36,16 @@ pub struct Noise {
 }
 
 impl Picture {
-    /// Reads a picture by its extension: `.exr`, `.npz` (a film) or `.png`, which has no error layers. Under another name it may
-    /// be a film or an EXR file still, by its first bytes.
+    /// Reads a picture of any [`Kind`]. PNG files have no error layers.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let mut file = open(path)?;
-        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let kind = extension.filter(|e| matches!(e.as_str(), "exr" | "npz" | "png"));
-        let kind = kind.or_else(|| {
-            let mut start = [0; 4];
-            file.read_exact(&mut start).ok()?;
-            match &start {
-                b"PK\x03\x04" => Some("npz".into()),
-                b"\x76\x2f\x31\x01" => Some("exr".into()),
-                _ => None,
-            }
-        });
-        match kind.as_deref() {
-            Some("exr") => Self::from_exr(path),
-            Some("npz") => {
+        match Kind::of(path)? {
+            Kind::Exr => Self::from_exr(path),
+            Kind::Film => {
                 let (film, provenance) = store::load(path)?;
                 Self::from_film(path.display().to_string(), &film, &provenance)
                     .map_err(|why| FileError::content(path, why))
             }
-            Some("png") => Self::from_png(path),
-            _ => Err(FileError::content(
-                path,
-                "not a picture that can be compared (.exr, .png, or .npz film)",
-            )),
+            Kind::Png => Self::from_png(path),
         }
     }
 
@@ -143,48 +124,15 @@ impl Picture {
         picture.not_empty().map_err(wrong)
     }
 
-    /// 8 or 16 bits per channel; grey is taken for R = G = B, and alpha says only what is covered.
     fn from_png(path: &Path) -> Result<Self, FileError> {
-        let wrong = |e: png::DecodingError| match e {
-            png::DecodingError::IoError(e) => FileError::reading(path, &e),
-            other => FileError::content(path, format!("invalid PNG: {other}")),
-        };
-        let mut decoder = png::Decoder::new(BufReader::new(open(path)?));
-        decoder.set_transformations(png::Transformations::normalize_to_color8());
-        let mut reader = decoder.read_info().map_err(wrong)?;
-        let bytes = reader
-            .output_buffer_size()
-            .ok_or_else(|| FileError::content(path, "the picture is too large"))?;
-        let mut data = vec![0; bytes];
-        let info = reader.next_frame(&mut data).map_err(wrong)?;
-        reader.finish().map_err(wrong)?;
-        let channels = info.color_type.samples();
-        let pixels = data[..info.buffer_size()].chunks_exact(channels);
-        let text = &reader.info().uncompressed_latin1_text;
-        let utf8 = &reader.info().utf8_text;
+        let png = read_png(path)?;
         let picture = Self {
             name: path.display().to_string(),
-            size: [info.width, info.height],
-            rgb: pixels
-                .clone()
-                .map(|p| match channels {
-                    1 | 2 => [p[0]; 3],
-                    _ => [p[0], p[1], p[2]],
-                })
-                .map(|p| p.map(decode_srgb))
-                .collect(),
-            covered: pixels
-                .map(|p| !matches!(channels, 2 | 4) || p[channels - 1] > 0)
-                .collect(),
+            size: png.size,
+            rgb: png.rgb,
+            covered: png.covered,
             noise: None,
-            origin: text
-                .iter()
-                .map(|t| (t.keyword.clone(), t.text.clone()))
-                .chain(
-                    utf8.iter()
-                        .filter_map(|t| Some((t.keyword.clone(), t.get_text().ok()?))),
-                )
-                .collect(),
+            origin: png.texts,
         };
         picture
             .not_empty()
@@ -197,15 +145,5 @@ impl Picture {
         } else {
             Err("no pixel has samples, so there is nothing to compare".into())
         }
-    }
-}
-
-/// Linear value of an sRGB level: IEC 61966-2-1, both pieces of its curve.
-fn decode_srgb(level: u8) -> f64 {
-    let v = f64::from(level) / 255.0;
-    if v <= 0.04045 {
-        v / 12.92
-    } else {
-        ((v + 0.055) / 1.055).powf(2.4)
     }
 }

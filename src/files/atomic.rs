@@ -3,7 +3,7 @@
 //! A killed process leaves its temporary file behind. A running process holds a lock on its file,
 //! so the next process that writes the same name can recognise leftovers, and removes them.
 
-use super::FileError;
+use super::{FileError, resolve};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -15,8 +15,9 @@ const SUFFIX: &str = ".partial";
 /// Replaces `path` by what `write` writes. On any error the file that was there is untouched and
 /// nothing else is left in its folder.
 ///
-/// Follows symbolic links. If the target is not an ordinary file (`/dev/null`, a pipe), writes the complete data into it
-/// instead of replacing it. Permissions are those of an ordinary new file.
+/// Follows symbolic links, also to a file that does not exist yet. Writes the complete data into a device (`/dev/null`) or an
+/// open pipe of this process (`/dev/stdout`) instead of replacing it. Refuses named pipes: opening one waits for a reader, and
+/// [`check_writable`] would send the reader away. Permissions are those of an ordinary new file.
 pub fn replace<F>(path: &Path, write: F) -> Result<(), FileError>
 where
     F: FnOnce(&mut BufWriter<File>) -> io::Result<()>,
@@ -44,19 +45,39 @@ fn target(path: &Path) -> io::Result<Target> {
     match fs::metadata(path) {
         Ok(meta) if meta.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
         Ok(meta) if meta.is_file() => Ok(Target::File(fs::canonicalize(path)?)),
+        Ok(meta) if is_named_pipe(path, &meta) => {
+            Err(io::Error::other("it is a pipe; name a file"))
+        }
         Ok(_) => Ok(Target::Special),
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            let folder = folder_of(path);
             if path.file_name().is_none() || path.as_os_str().as_encoded_bytes().ends_with(b"/") {
                 return Err(io::Error::other("the path names a folder, not a file"));
             }
+            let file = resolve(path);
+            let folder = folder_of(&file);
             if !folder.exists() {
                 let text = format!("no such folder \"{}\"", folder.display());
                 return Err(io::Error::other(text));
             }
-            Ok(Target::File(path.into()))
+            Ok(Target::File(file))
         }
         Err(e) => Err(e),
+    }
+}
+
+/// Whether this is a pipe or a socket with a name of its own. Those that a shell opens for this process have none
+/// (`/dev/stdout`, `/dev/fd/63`).
+fn is_named_pipe(path: &Path, meta: &fs::Metadata) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt;
+        let kind = meta.file_type();
+        (kind.is_fifo() || kind.is_socket()) && fs::canonicalize(path).is_ok()
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = (path, meta);
+        false
     }
 }
 
@@ -253,6 +274,29 @@ mod tests {
         replace(&link, |f| f.write_all(b"through")).unwrap();
         assert!(link.is_symlink());
         assert_eq!(fs::read_to_string(&path).unwrap(), "through");
+
+        // A link to a file that does not exist yet, by way of another.
+        fs::create_dir(dir.path().join("far")).unwrap();
+        symlink("far/new", dir.path().join("dangling")).unwrap();
+        symlink("dangling", dir.path().join("twice")).unwrap();
+        replace(&dir.path().join("twice"), |f| f.write_all(b"far")).unwrap();
+        assert!(dir.path().join("twice").is_symlink());
+        let far = dir.path().join("far/new");
+        assert_eq!(fs::read_to_string(far).unwrap(), "far");
+        symlink("nowhere/new", dir.path().join("broken")).unwrap();
+        let error = check_writable(&dir.path().join("broken")).unwrap_err();
+        assert!(error.to_string().contains("no such folder"), "{error}");
+
+        // A pipe: opening it would wait for a reader.
+        let pipe = dir.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.unwrap().success());
+        for error in [
+            check_writable(&pipe).unwrap_err(),
+            replace(&pipe, |_| Ok(())).unwrap_err(),
+        ] {
+            assert!(error.to_string().ends_with("it is a pipe; name a file"));
+        }
 
         replace(Path::new("/dev/null"), |f| f.write_all(b"x")).unwrap();
         let null = fs::metadata("/dev/null").unwrap();

@@ -3,7 +3,7 @@
 //! While a process renders into a film, it locks a file beside it. The operating system releases the lock when the process
 //! ends, even if it is killed. The lock file then stays, but is unlocked.
 
-use crate::files::FileError;
+use crate::files::{FileError, resolve};
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ impl Lock {
             _ => {}
         }
         // Follow symbolic links: another process may have locked the film under its own name.
-        let film = fs::canonicalize(path).unwrap_or_else(|_| path.into());
+        let film = resolve(path);
         let name = film.file_name().unwrap_or_default().to_string_lossy();
         let end = name.floor_char_boundary(200);
         let beside = film.with_file_name(format!(".{}.lock", &name[..end]));

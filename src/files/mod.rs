@@ -3,6 +3,8 @@
 pub mod atomic;
 mod error;
 pub mod lock;
+mod resolve;
 
 pub(crate) use error::reason;
 pub use error::{FileError, open};
+pub use resolve::resolve;

@@ -1,62 +1,67 @@
 //! OpenEXR pictures: linear 32-bit floats with error layers.
 
+use super::ExrChannels;
 use super::metadata::{Value, entries};
-use super::pixels::Pixels;
+use super::pixels::{Pixels, finite};
 use crate::files::FileError;
 use crate::files::atomic;
-use crate::film::{Estimate, Film};
+use crate::film::Film;
 use crate::provenance::Provenance;
 use exr::prelude::{
-    AttributeValue, Blocks, Compression, Encoding, Image, Layer, LayerAttributes, LineOrder,
-    SpecificChannels, Text, Vec2, WritableImage,
+    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Image, Layer,
+    LayerAttributes, LineOrder, Text, Vec2, WritableImage, f16,
 };
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Writes the whole picture: channels `R G B A`, `error.R error.G error.B error.Y` (standard errors of the mean, `Y` of the
-/// luminance) and `samples`, as 32-bit floats in ZIP-compressed scan lines, which every reader knows. Counts of samples are
-/// exact up to 2^24. Equal pictures are equal files.
+/// The channels of a file with errors and samples.
+const ALL_CHANNELS: [&str; 9] = [
+    "R", "G", "B", "A", "error.R", "error.G", "error.B", "error.Y", "samples",
+];
+
+/// Writes the whole picture in ZIP-compressed scan lines, which every reader knows. All channels are `R G B A`, `error.R error.G
+/// error.B error.Y` (standard errors of the mean, `Y` of the luminance) and `samples`, as 32-bit floats: counts are exact up to
+/// 2^24. Readers that trip over layers get `R G B` alone. Equal pictures are equal files.
 ///
 /// Pixels without samples are 0 in every channel, alpha included; alpha is 1 elsewhere. No value is infinite
-/// or NaN: what overflows a float stands as the largest float.
-pub fn write_exr(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), FileError> {
+/// or NaN: what is too large for a float stands as the largest float of its kind.
+pub fn write_exr(
+    path: &Path,
+    film: &Film,
+    provenance: &Provenance,
+    channels: ExrChannels,
+) -> Result<(), FileError> {
+    let names: &[&str] = match channels {
+        ExrChannels::All => &ALL_CHANNELS,
+        ExrChannels::Rgb | ExrChannels::RgbHalf => &ALL_CHANNELS[..3],
+    };
+    let size = Vec2(film.size[0] as usize, film.size[1] as usize);
+    let mut values = vec![Vec::with_capacity(size.area()); names.len()];
     let pixels = Pixels::new(film);
-    // exr finds each channel's place in the file by its name; the order here is only the tuple's.
-    let channels = SpecificChannels::build()
-        .with_channel::<f32>("R")
-        .with_channel::<f32>("G")
-        .with_channel::<f32>("B")
-        .with_channel::<f32>("A")
-        .with_channel::<f32>("error.R")
-        .with_channel::<f32>("error.G")
-        .with_channel::<f32>("error.B")
-        .with_channel::<f32>("error.Y")
-        .with_channel::<f32>("samples")
-        .with_pixel_fn(|Vec2(x, y)| match pixels.at(x as u32, y as u32) {
-            Some(Estimate {
-                mean: [r, g, b],
-                error: [er, eg, eb, ey],
-                samples,
-                replicates: _,
-            }) => (
-                float(r),
-                float(g),
-                float(b),
-                1.0,
-                float(er),
-                float(eg),
-                float(eb),
-                float(ey),
-                samples as f32,
-            ),
-            None => (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        });
+    for y in 0..film.size[1] {
+        for x in 0..film.size[0] {
+            let of_pixel = pixels.at(x, y).map_or([0.0; ALL_CHANNELS.len()], |e| {
+                let ([r, g, b], [er, eg, eb, ey]) = (e.mean.map(finite), e.error.map(finite));
+                [r, g, b, 1.0, er, eg, eb, ey, e.samples as f32]
+            });
+            for (channel, value) in values.iter_mut().zip(of_pixel) {
+                channel.push(value);
+            }
+        }
+    }
+    let channels = names.iter().zip(values).map(|(&name, values)| {
+        let values = match channels {
+            ExrChannels::All | ExrChannels::Rgb => FlatSamples::F32(values),
+            ExrChannels::RgbHalf => FlatSamples::F16(values.into_iter().map(half).collect()),
+        };
+        AnyChannel::new(name, values)
+    });
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let size = Vec2(film.size[0] as usize, film.size[1] as usize);
+    let channels = AnyChannels::sort(channels.collect());
     let layer = Layer::new(size, attributes(provenance), encoding, channels);
     let image = Image::from_layer(layer);
     atomic::replace(path, |file| {
@@ -105,13 +110,9 @@ fn sort_attributes(mut file: impl Read + Write + Seek) -> io::Result<()> {
     Ok(())
 }
 
-/// The nearest float that is finite. NaN, which only an overflow can have left, counts as one.
-fn float(x: f64) -> f32 {
-    let largest = f64::from(f32::MAX);
-    if x.is_nan() {
-        return f32::MAX;
-    }
-    x.clamp(-largest, largest) as f32
+/// The nearest half that is finite.
+fn half(x: f32) -> f16 {
+    f16::from_f32(x.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
 }
 
 fn attributes(provenance: &Provenance) -> LayerAttributes {
@@ -149,13 +150,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_too_large_for_f32_become_the_largest_f32() {
-        assert_eq!(float(1e300), f32::MAX);
-        assert_eq!(float(f64::INFINITY), f32::MAX);
-        assert_eq!(float(f64::NAN), f32::MAX);
-        assert_eq!(float(-1e39), f32::MIN);
-        // Half an ulp above the largest float would round to infinity.
-        assert_eq!(float(f64::from(f32::MAX) * (1.0 + 1e-8)), f32::MAX);
-        assert_eq!(float(0.1), 0.1);
+    fn values_too_large_for_a_half_become_the_largest_half() {
+        assert_eq!(half(1e30), f16::MAX);
+        assert_eq!(half(f32::MIN), f16::MIN);
+        // Half an ulp above the largest half would round to infinity.
+        assert_eq!(half(65520.0), f16::MAX);
+        assert_eq!(half(0.5).to_f32(), 0.5);
     }
 }

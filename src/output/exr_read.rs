@@ -4,9 +4,9 @@ use crate::files::{FileError, open};
 use exr::error::Error;
 use exr::image::{AnyChannel, AnyChannels, FlatSamples, Layer};
 use exr::meta::MetaData;
-use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, Text};
+use exr::prelude::{AttributeValue, LayerAttributes, ReadChannels, ReadLayers, SampleType, Text};
 use std::collections::BTreeMap;
-use std::io::{Cursor, Read};
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
 /// How many bytes one byte of a chunk can become: deflate's limit (RFC 1951: 258 bytes from two bits),
@@ -46,12 +46,16 @@ pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
         .read_to_end(&mut bytes)
         .map_err(|e| FileError::io(path, "cannot read", &e))?;
     // From memory: a damaged offset then can't make the system call fail, as if access were at fault.
-    decode(Cursor::new(bytes.as_slice())).map_err(|e| match e {
+    decode(Cursor::new(bytes.as_slice())).map_err(|e| failure(path, e))
+}
+
+fn failure(path: &Path, e: Error) -> FileError {
+    match e {
         Error::Io(e) => FileError::reading(path, &e),
         Error::Invalid(what) => FileError::content(path, format!("invalid EXR: {what}")),
         Error::NotSupported(what) => FileError::content(path, format!("unsupported EXR: {what}")),
         Error::Aborted => FileError::content(path, "reading was aborted"),
-    })
+    }
 }
 
 fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
@@ -136,19 +140,7 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
         }
         None => None,
     };
-    let mut attributes = BTreeMap::new();
-    let software = layer.attributes.software_name.iter();
-    attributes.extend(software.map(|s| ("software".to_owned(), utf8(s))));
-    for (name, value) in &layer.attributes.other {
-        let value = match value {
-            AttributeValue::Text(text) => utf8(text),
-            AttributeValue::F64(x) => x.to_string(),
-            AttributeValue::F32(x) => x.to_string(),
-            AttributeValue::I32(x) => x.to_string(),
-            _ => continue,
-        };
-        attributes.insert(utf8(name), value);
-    }
+    let attributes = texts(&layer.attributes);
     Ok(Picture {
         size,
         rgb,
@@ -156,6 +148,54 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
         error,
         samples,
         attributes,
+    })
+}
+
+/// The attributes that are text or a number, as text.
+fn texts(attributes: &LayerAttributes) -> BTreeMap<String, String> {
+    let software = attributes.software_name.iter();
+    let software = software.map(|s| ("software".to_owned(), utf8(s)));
+    let others = attributes.other.iter().filter_map(|(name, value)| {
+        let value = match value {
+            AttributeValue::Text(text) => utf8(text),
+            AttributeValue::F64(x) => x.to_string(),
+            AttributeValue::F32(x) => x.to_string(),
+            AttributeValue::I32(x) => x.to_string(),
+            _ => return None,
+        };
+        Some((utf8(name), value))
+    });
+    software.chain(others).collect()
+}
+
+/// What an EXR file says of itself before its pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExrHeader {
+    /// Width and height in pixels, of the data window.
+    pub size: [u32; 2],
+    /// Names and types of all channels.
+    pub channels: Vec<String>,
+    /// Attributes that are text or a number, as text.
+    pub attributes: BTreeMap<String, String>,
+}
+
+/// Reads the header of any EXR file; of its first part, if it has several.
+pub fn read_exr_header(path: &Path) -> Result<ExrHeader, FileError> {
+    let mut file = BufReader::new(open(path)?);
+    let meta = MetaData::read_from_buffered(&mut file, false).map_err(|e| failure(path, e))?;
+    let header = &meta.headers[0];
+    let channels = header.channels.list.iter().map(|channel| {
+        let kind = match channel.sample_type {
+            SampleType::F16 => "half",
+            SampleType::F32 => "float",
+            SampleType::U32 => "uint",
+        };
+        format!("{} ({kind})", utf8(&channel.name))
+    });
+    Ok(ExrHeader {
+        size: [header.layer_size.0 as u32, header.layer_size.1 as u32],
+        channels: channels.collect(),
+        attributes: texts(&header.own_attributes),
     })
 }
 
@@ -206,7 +246,7 @@ mod tests {
     use super::*;
     use crate::film::Film;
     use crate::film::coverage::Rect;
-    use crate::output::write_exr;
+    use crate::output::{ExrChannels, write_exr};
     use crate::provenance::tests::example;
 
     /// A small picture of several chunks.
@@ -217,7 +257,7 @@ mod tests {
         let pixel = |i: u32| [0, 1, 2, 3].map(|r| [1, 2, 3, 4].map(|c| f64::from(i * c + r)));
         film.put_samples(rect, 0..8, (0..200).map(pixel).collect());
         let path = tempfile::NamedTempFile::new().unwrap();
-        write_exr(path.path(), &film, &example(size)).unwrap();
+        write_exr(path.path(), &film, &example(size), ExrChannels::All).unwrap();
         std::fs::read(path.path()).unwrap()
     }
 

@@ -6,19 +6,22 @@ mod metadata;
 mod npz;
 pub mod pixels;
 mod png;
+mod png_read;
 pub mod report;
 pub mod store;
 
 pub use exr::write_exr;
-pub use exr_read::{Picture, read_exr};
+pub use exr_read::{ExrHeader, Picture, read_exr, read_exr_header};
 pub(crate) use metadata::entries;
 pub(crate) use pixels::Pixels;
 pub use png::write_png;
+pub use png_read::{PngHeader, read_png, read_png_header};
 pub use report::Report;
 
-use crate::files::FileError;
+use crate::files::{FileError, open};
 use crate::film::Film;
 use crate::provenance::Provenance;
+use std::io::Read as _;
 use std::path::Path;
 
 /// Picture formats, chosen by a file name's extension.
@@ -28,6 +31,64 @@ pub enum Format {
     Exr,
     /// `.png`: 8-bit sRGB.
     Png,
+}
+
+/// The kinds of files that hold pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `.npz`.
+    Film,
+    /// `.exr`.
+    Exr,
+    /// `.png`.
+    Png,
+}
+
+impl Kind {
+    /// The kind of a file by its extension, in any case. Under another name it may be a film or an EXR file still, by its first
+    /// bytes.
+    pub fn of(path: &Path) -> Result<Self, FileError> {
+        let mut file = open(path)?;
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match extension.as_deref() {
+            Some("exr") => return Ok(Self::Exr),
+            Some("npz") => return Ok(Self::Film),
+            Some("png") => return Ok(Self::Png),
+            _ => {}
+        }
+        let mut start = [0; 4];
+        match file.read_exact(&mut start).map(|()| &start) {
+            Ok(b"PK\x03\x04") => Ok(Self::Film),
+            Ok(b"\x76\x2f\x31\x01") => Ok(Self::Exr),
+            Ok(b"\x89PNG") => Ok(Self::Png),
+            _ => Err(FileError::content(
+                path,
+                "not a picture that etendue reads (.exr, .png, or .npz film)",
+            )),
+        }
+    }
+}
+
+/// Which channels an EXR file has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+pub enum ExrChannels {
+    /// R, G, B, A, and the layers of errors and samples, as 32-bit floats.
+    #[default]
+    All,
+    /// R, G and B as 32-bit floats.
+    Rgb,
+    /// R, G and B as 16-bit floats.
+    RgbHalf,
+}
+
+/// How pictures are written.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct WriteOptions {
+    /// Brightens a PNG by this many powers of two.
+    pub exposure_stops: f64,
+    /// What an EXR file holds.
+    pub exr: ExrChannels,
 }
 
 impl Format {
@@ -48,17 +109,17 @@ impl Format {
         }
     }
 
-    /// Writes `film` to `path` in this format; `exposure_stops` is for PNG only.
+    /// Writes `film` to `path` in this format.
     pub fn write(
         self,
         path: &Path,
         film: &Film,
         provenance: &Provenance,
-        exposure_stops: f64,
+        options: &WriteOptions,
     ) -> Result<(), FileError> {
         match self {
-            Self::Exr => write_exr(path, film, provenance),
-            Self::Png => write_png(path, film, provenance, exposure_stops),
+            Self::Exr => write_exr(path, film, provenance, options.exr),
+            Self::Png => write_png(path, film, provenance, options.exposure_stops),
         }
     }
 }

@@ -56,3 +56,28 @@ impl<'a> Pixels<'a> {
         self.covered == Rect::whole(self.film.size).area()
     }
 }
+
+/// The nearest float that is finite. NaN, which only an overflow can have left, counts as too large.
+pub fn finite(x: f64) -> f32 {
+    let largest = f64::from(f32::MAX);
+    if x.is_nan() {
+        return f32::MAX;
+    }
+    x.clamp(-largest, largest) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_too_large_for_f32_become_the_largest_f32() {
+        assert_eq!(finite(1e300), f32::MAX);
+        assert_eq!(finite(f64::INFINITY), f32::MAX);
+        assert_eq!(finite(f64::NAN), f32::MAX);
+        assert_eq!(finite(-1e39), f32::MIN);
+        // Half an ulp above the largest float would round to infinity.
+        assert_eq!(finite(f64::from(f32::MAX) * (1.0 + 1e-8)), f32::MAX);
+        assert_eq!(finite(0.1), 0.1);
+    }
+}

@@ -3,16 +3,18 @@
 //! | array | type, shape | holds |
 //! |---|---|---|
 //! | `provenance` | `\|S`, one item | JSON: format and its version, size, bounds, coverage, [`Provenance`] |
+//! | `mean` | f32 (h, w, 3) | mean radiance, linear RGB: what an EXR file has |
+//! | `error` | f32 (h, w, 4) | standard errors of the mean of R, G, B, and of the luminance: what an EXR file has |
 //! | `counts` | u64 (h, w) | samples of each pixel, without those left out |
 //! | `sums` | f64 (h, w, 4 replicates, 4) | R, G, B, and luminance², over finished blocks |
 //! | `partial` | f32 (h, w, 4 replicates, 4) | the same over an unfinished block; only there while one is |
 //! | `left_out` | u64 (n, 2 + 4 replicates) | pixels x, y with samples that were not finite, and how many of each replicate; only there if there are any |
 //!
-//! h and w are those of `bounds`. In Python:
-//! `f = numpy.load("x.npz"); json.loads(f["provenance"].item())`, and a pixel's mean is
-//! `f["sums"].sum(2)[..., :3] / f["counts"][..., None]` when no block is unfinished.
+//! h and w are those of `bounds`. `mean` and `error` follow from the others, and are there for readers in other languages: this
+//! program does not read them.
 
 use super::npz::{self, Array, Damage, Reader};
+use super::pixels::{Pixels, finite};
 use crate::files::atomic;
 use crate::files::{FileError, open};
 use crate::film::coverage::{Coverage, Rect};
@@ -20,6 +22,7 @@ use crate::film::pilot::Pilot;
 use crate::film::{BLOCK, Film, REPLICATES, Sums};
 use crate::provenance::Provenance;
 use crate::scene::LARGEST_STRATA;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -45,6 +48,9 @@ struct Header {
     replicates: usize,
     block: u64,
     partial: bool,
+    /// Whether there are arrays `mean` and `error`.
+    #[serde(default)]
+    developed: bool,
     /// Rows of the array `left_out`.
     #[serde(default)]
     left_out: u64,
@@ -78,6 +84,7 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         replicates: REPLICATES,
         block: BLOCK,
         partial: unfinished,
+        developed: true,
         left_out: left_out.len() as u64,
         reached: !film.reached().is_empty(),
         pilot: film.pilot.clone(),
@@ -96,6 +103,7 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
             Ok(counts)
         })
         .map_err(|e| FileError::content(path, format!("inconsistent film: {e}")))?;
+    let [mean, error] = develop(film);
     let [height, width] = [film.bounds.height(), film.bounds.width()].map(u64::from);
     let per_replicate = vec![height, width, REPLICATES as u64, 4];
     let mut arrays = vec![
@@ -104,6 +112,18 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
             descr: format!("|S{}", json.len()),
             shape: vec![],
             data: &json,
+        },
+        Array {
+            name: "mean",
+            descr: "<f4".into(),
+            shape: vec![height, width, 3],
+            data: bytemuck::cast_slice(&mean),
+        },
+        Array {
+            name: "error",
+            descr: "<f4".into(),
+            shape: vec![height, width, 4],
+            data: bytemuck::cast_slice(&error),
         },
         Array {
             name: "counts",
@@ -143,6 +163,24 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         });
     }
     atomic::replace(path, |file| npz::write(file, &arrays))
+}
+
+/// Means and errors of all pixels of the film, row by row, as an EXR file has them; 0 where there are no samples.
+fn develop(film: &Film) -> [Vec<f32>; 2] {
+    let pixels = Pixels::new(film);
+    let of_row = |y| {
+        let estimates = (film.bounds.x0..film.bounds.x1).map(|x| pixels.at(x, y));
+        estimates.map(Option::unwrap_or_default).collect::<Vec<_>>()
+    };
+    let rows: Vec<_> = (film.bounds.y0..film.bounds.y1)
+        .into_par_iter()
+        .map(of_row)
+        .collect();
+    let all = || rows.iter().flatten();
+    [
+        all().flat_map(|e| e.mean.map(finite)).collect(),
+        all().flat_map(|e| e.error.map(finite)).collect(),
+    ]
 }
 
 /// The part of a film's file before its numbers.
@@ -220,6 +258,10 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     let pixels = header.bounds.area();
     let [height, width] = [header.bounds.height(), header.bounds.width()].map(u64::from);
     let per_replicate = [height, width, REPLICATES as u64, 4];
+    if header.developed {
+        reader.array::<[f32; 3]>("mean", "<f4", &[height, width, 3], pixels)?;
+        reader.array::<[f32; 4]>("error", "<f4", &[height, width, 4], pixels)?;
+    }
     let stored: Vec<u64> = reader.array("counts", "<u8", &[height, width], pixels)?;
     let sums: Vec<[Sums<f64>; REPLICATES]> = reader.array("sums", "<f8", &per_replicate, pixels)?;
     let partial: Vec<[Sums<f32>; REPLICATES]> = if header.partial {

@@ -3,7 +3,7 @@
 use crate::compare::{Limits, Picture, compare, html};
 use crate::files::atomic;
 use crate::film::Film;
-use crate::output::write_exr;
+use crate::output::{ExrChannels, write_exr};
 use crate::provenance::Provenance;
 use std::io::Write;
 use std::path::Path;
@@ -46,7 +46,7 @@ pub fn assert_golden(golden: &Path, film: &Film, provenance: &Provenance) {
     let mut provenance = provenance.clone();
     provenance.describe(film);
     if std::env::var_os(BLESS).is_some() {
-        if let Err(e) = write_exr(golden, film, &provenance) {
+        if let Err(e) = write_exr(golden, film, &provenance, ExrChannels::All) {
             panic!("{e}");
         }
         return;

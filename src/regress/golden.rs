@@ -5,7 +5,7 @@ use crate::compare::{Picture, verdict::verdict};
 use crate::film::Film;
 use crate::film::REPLICATES;
 use crate::film::coverage::Rect;
-use crate::output::write_exr;
+use crate::output::{ExrChannels, write_exr};
 use crate::provenance::{Provenance, integrator_name, light_name};
 use crate::scene::{Scene, parse};
 use crate::settings::{Integrator, LightParts, Overrides, Settings};
@@ -134,7 +134,7 @@ pub fn bless(
     let golden = case.golden_path();
     let folder = case.dir.join("golden");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    write_exr(&golden, &film, &provenance).map_err(text)?;
+    write_exr(&golden, &film, &provenance, ExrChannels::All).map_err(text)?;
     case.clear();
     let bytes = std::fs::metadata(&golden).map_err(|e| format!("{}: {e}", golden.display()))?;
     Ok(Some(Bless {

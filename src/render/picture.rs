@@ -4,7 +4,7 @@ use super::Error;
 use crate::compare::{self, Comparison, Limits, compare};
 use crate::film::error::RelativeError;
 use crate::film::{Estimate, Film};
-use crate::output::{Format, Pixels, store, write_png};
+use crate::output::{Format, Pixels, WriteOptions, store, write_png};
 use crate::provenance::Provenance;
 use crate::run::StopReason;
 use std::path::Path;
@@ -106,7 +106,8 @@ impl Picture {
             return Ok(store::save(path, &self.film, &self.provenance)?);
         }
         let format = Format::from_path(path).map_err(Error::Input)?;
-        Ok(format.write(path, &self.film, &self.provenance, 0.0)?)
+        let options = WriteOptions::default();
+        Ok(format.write(path, &self.film, &self.provenance, &options)?)
     }
 
     /// Writes it to `path` as PNG, brightened by `stops` powers of two.

@@ -263,3 +263,37 @@ fn a_film_that_has_everything_says_so() {
         ));
     assert!(bench.path("b.png").exists());
 }
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_nothing_leads_there_and_a_pipe_is_refused() {
+    use std::os::unix::fs::symlink;
+    let bench = Bench::new();
+    fs::create_dir(bench.path("far")).unwrap();
+    for name in ["a.png", "f.npz", "r.json"] {
+        symlink(format!("far/{name}"), bench.path(name)).unwrap();
+    }
+    bench.render("--spp 1 -o a.png --film f.npz --report r.json");
+    for name in ["a.png", "f.npz", "r.json"] {
+        assert!(bench.path(name).is_symlink(), "{name}");
+        assert!(bench.path(&format!("far/{name}")).is_file(), "{name}");
+    }
+    // It is resumed through the link.
+    bench.render("--spp 2 -o a.png --film f.npz");
+    assert_eq!(bench.film("far/f.npz").coverage.samples(), (2, 2));
+
+    assert_eq!(bench.shell(&[], "mkfifo pipe.png"), 0);
+    let refused = bench.run("render box.toml --backend cpu --spp 1 -o pipe.png");
+    refused
+        .code(4)
+        .stderr(says("pipe.png: cannot write: it is a pipe; name a file"));
+}
+
+/// A pipe that the shell opens for the program has no name, and is written.
+#[cfg(unix)]
+#[test]
+fn open_pipes_are_written() {
+    let bench = Bench::new();
+    let script = r#""$0" render box.toml --backend cpu --quiet --spp 1 -o a.png --report /dev/stdout | grep -q '"spp"'"#;
+    assert_eq!(bench.shell(&[], script), 0, "{}", bench.said());
+}

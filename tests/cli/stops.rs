@@ -79,7 +79,7 @@ fn hanging_up_stays_ignored() {
     assert!(bench.path("a.png").exists(), "nothing was saved");
 }
 
-/// The first signal's work can last: here on a report to a pipe that nobody reads. A second signal ends it.
+/// The first signal's work can last: here on a report to a pipe that is full and that nobody reads. A second signal ends it.
 #[cfg(unix)]
 #[test]
 fn a_second_signal_ends_the_process_at_once() {
@@ -95,22 +95,28 @@ fn a_second_signal_ends_the_process_at_once() {
         assert!(done.expect("a shell").success(), "{script}");
     };
     for [first, second] in [["INT", "TERM"], ["TERM", "INT"]] {
-        sh("rm -f pipe a.png; mkfifo pipe");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
+        sh("rm -f a.png f.npz");
+        // The shell fills the pipe with the 64 KiB that it holds, and becomes the program.
+        let script = format!(
+            "head -c 65536 /dev/zero; exec {} render box.toml --backend cpu --quiet --spp 4000000 -o a.png --film f.npz --report -",
+            env!("CARGO_BIN_EXE_etendue")
+        );
+        let mut child = Command::new("sh")
             .current_dir(bench.dir.path())
-            .args(
-                "render box.toml --backend cpu --quiet --spp 4000000 -o a.png --report pipe"
-                    .split(' '),
-            )
+            .args(["-c", &script])
             .stdin(Stdio::null())
+            .stdout(Stdio::piped())
             .spawn()
             .expect("it starts");
         let pid = child.id();
-        // The program opens the pipe once at its start, to see that it can.
-        sh("cat pipe");
+        let begun = Instant::now();
+        // It locks the film after it has installed its handlers of signals.
+        while !bench.path(".f.npz.lock").exists() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "not begun");
+            sleep(Duration::from_millis(20));
+        }
         sleep(Duration::from_millis(500));
         sh(&format!("kill -{first} {pid}"));
-        let begun = Instant::now();
         while !bench.path("a.png").exists() {
             assert!(begun.elapsed() < Duration::from_secs(60), "nothing saved");
             sleep(Duration::from_millis(20));
@@ -131,4 +137,20 @@ fn a_second_signal_ends_the_process_at_once() {
         let expected = if second == "INT" { 130 } else { 143 };
         assert_eq!(status.code(), Some(expected), "{first}, then {second}");
     }
+}
+
+/// 256 samples of a picture of ordinary size take minutes on the CPU reference.
+#[test]
+fn the_cpu_reference_ends_after_half_a_minute_unless_told_otherwise() {
+    let bench = Bench::new();
+    bench
+        .run("render box.toml --backend cpu --size 1024x768 -o a.png --report r.json")
+        .success()
+        .stderr(says("until 256 samples per pixel, or 30 s"))
+        .stderr(says("note: without a stop condition the CPU reference ends after 30 s"));
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
+    assert_eq!(report["stop_reason"], "time");
+    let seconds = report["seconds"]["render"].as_f64().unwrap();
+    assert!((29.0..60.0).contains(&seconds), "{seconds}");
 }

@@ -1,7 +1,6 @@
-//! The command lines of `etendue develop` and `etendue merge`.
+//! The command lines of `etendue develop`, `etendue info` and `etendue merge`.
 
-use super::Talk;
-use crate::cli::values;
+use super::{PictureArgs, Talk};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,14 +15,29 @@ pub struct DevelopArgs {
     /// Picture to write, .exr or .png. Repeatable
     #[arg(short, long, required = true, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Exposure of PNG pictures in stops, applied before the sRGB curve
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = values::exposure,
-          allow_hyphen_values = true)]
-    pub exposure: f64,
+    /// How pictures are written.
+    #[command(flatten)]
+    pub pictures: PictureArgs,
 
     /// How much to print.
     #[command(flatten)]
     pub talk: Talk,
+}
+
+/// `etendue info`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  etendue info long.npz
+  etendue info picture.exr --json
+
+A film is read whole and checked. The keys are those of the headers of EXR and PNG files.")]
+pub struct InfoArgs {
+    /// Film (.npz) or picture (.exr or .png)
+    pub file: PathBuf,
+    /// Print JSON; of a film it has the text of the scene file too
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `etendue merge`.

@@ -1,6 +1,6 @@
 //! The command line of `etendue render`.
 
-use super::{Backend, Talk};
+use super::{Backend, PictureArgs, Talk};
 use crate::cli::values;
 use crate::film::BLOCK;
 use crate::film::coverage::Rect;
@@ -43,10 +43,9 @@ pub struct RenderArgs {
     /// [default: STEM.exr and STEM.png in the working directory]
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Exposure of PNG pictures in stops, applied before the sRGB curve
-    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = values::exposure,
-          allow_hyphen_values = true)]
-    pub exposure: f64,
+    /// How pictures are written.
+    #[command(flatten)]
+    pub pictures: PictureArgs,
     /// Rewrite this .png every few seconds, for an image viewer that reloads it
     #[arg(long, value_name = "FILE.png")]
     pub watch: Option<PathBuf>,
@@ -58,7 +57,7 @@ pub struct RenderArgs {
     pub dump_wgsl: Option<PathBuf>,
 
     /// Total samples per pixel, including those already in the film
-    /// [default: 256 if no other stop condition is given]
+    /// [default: 256 if no other stop condition is given; on the CPU reference also --time 30s]
     #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true, help_heading = "When to stop")]
     pub spp: Option<u64>,
     /// Rays per pixel-sample, as in the report: strata² x N samples per pixel

@@ -1,0 +1,146 @@
+//! `etendue info`: what a film or a picture says of itself.
+
+use super::args::InfoArgs;
+use super::failure::Failure;
+use crate::film::coverage::Rect;
+use crate::output::{Kind, entries, read_exr_header, read_png_header, store};
+use serde::Serialize;
+use std::path::Path;
+
+/// What a file says of itself.
+#[derive(Serialize)]
+struct Info {
+    file: String,
+    /// `film`, `EXR picture` or `PNG picture`.
+    kind: &'static str,
+    /// Width and height of the whole picture in pixels.
+    size: [u32; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    film: Option<FilmInfo>,
+    /// Names and types of the channels of a picture.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    channels: Vec<String>,
+    /// The entries of its header.
+    #[serde(serialize_with = "as_map")]
+    entries: Vec<(String, String)>,
+}
+
+/// What only a film says.
+#[derive(Serialize)]
+struct FilmInfo {
+    /// The part of the picture that it holds.
+    region: Rect,
+    /// Rectangles of pixels, and the sample numbers that each has, such as `0..256`.
+    coverage: Vec<(String, String)>,
+    /// Whether `--adaptive` chose the numbers of samples.
+    adaptive: bool,
+    /// The text of the scene file.
+    scene_text: String,
+}
+
+fn as_map<S: serde::Serializer>(entries: &[(String, String)], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(entries.iter().map(|(key, value)| (key, value)))
+}
+
+/// Prints what the file says, as lines or as JSON.
+pub fn info(args: &InfoArgs) -> Result<(), Failure> {
+    let info = match Kind::of(&args.file)? {
+        Kind::Film => of_film(&args.file)?,
+        Kind::Exr => of_exr(&args.file)?,
+        Kind::Png => of_png(&args.file)?,
+    };
+    let text = if args.json {
+        let json = serde_json::to_string_pretty(&info);
+        json.map_err(|e| Failure::Input(e.to_string()))? + "\n"
+    } else {
+        info.lines()
+    };
+    super::write_stdout(&text)
+}
+
+fn of_film(path: &Path) -> Result<Info, Failure> {
+    let (film, mut provenance) = store::load(path)?;
+    provenance.describe(&film);
+    let ranges = |ranges: &[std::ops::Range<u64>]| {
+        let each = ranges.iter().map(|r| format!("{}..{}", r.start, r.end));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let cells = film.coverage.cells();
+    let entries = entries(&provenance).into_iter();
+    Ok(Info {
+        file: path.display().to_string(),
+        kind: "film",
+        size: film.size,
+        film: Some(FilmInfo {
+            region: film.bounds,
+            coverage: cells.map(|(r, s)| (r.to_string(), ranges(s))).collect(),
+            adaptive: film.pilot.is_some(),
+            scene_text: provenance.scene_text.clone(),
+        }),
+        channels: Vec::new(),
+        entries: entries.map(|(k, v)| (k.to_owned(), v.to_string())).collect(),
+    })
+}
+
+fn of_exr(path: &Path) -> Result<Info, Failure> {
+    let header = read_exr_header(path)?;
+    Ok(Info {
+        file: path.display().to_string(),
+        kind: "EXR picture",
+        size: header.size,
+        film: None,
+        channels: header.channels,
+        entries: header.attributes.into_iter().collect(),
+    })
+}
+
+fn of_png(path: &Path) -> Result<Info, Failure> {
+    let header = read_png_header(path)?;
+    Ok(Info {
+        file: path.display().to_string(),
+        kind: "PNG picture",
+        size: header.size,
+        film: None,
+        channels: vec![header.channels],
+        entries: header.texts,
+    })
+}
+
+/// Most rectangles of a film that are listed: adaptive films have hundreds.
+const LISTED: usize = 8;
+
+impl Info {
+    fn lines(&self) -> String {
+        let [width, height] = self.size;
+        let mut text = format!("{}: {}, {width}x{height}\n", self.file, self.kind);
+        let mut line = |key: &str, value: &str| text += &format!("  {key:<27} {value}\n");
+        if let Some(film) = &self.film {
+            if film.region != Rect::whole(self.size) {
+                line("region", &film.region.to_string());
+            }
+            match &film.coverage[..] {
+                [] => line("sample numbers", "none"),
+                [(_, only)] => line("sample numbers", only),
+                several => {
+                    for (rect, ranges) in several.iter().take(LISTED) {
+                        line("sample numbers", &format!("{ranges} in {rect}"));
+                    }
+                    if several.len() > LISTED {
+                        let more = several.len() - LISTED;
+                        line("", &format!("and {more} more rectangles (--json lists them)"));
+                    }
+                }
+            }
+            if film.adaptive {
+                line("adaptive", "yes");
+            }
+        }
+        if !self.channels.is_empty() {
+            line("channels", &self.channels.join(", "));
+        }
+        for (key, value) in &self.entries {
+            line(key, value);
+        }
+        text
+    }
+}
