@@ -113,7 +113,14 @@ fn relative_error(bencher: Bencher) {
 fn exr_file(bencher: Bencher) {
     let (film, provenance) = film(BLOCK);
     let dir = tempfile::tempdir().expect("a temporary folder");
-    bencher.bench(|| write_exr(&dir.path().join("x.exr"), &film, &provenance, ExrChannels::All));
+    bencher.bench(|| {
+        write_exr(
+            &dir.path().join("x.exr"),
+            &film,
+            &provenance,
+            ExrChannels::All,
+        )
+    });
 }
 
 #[divan::bench]

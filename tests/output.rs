@@ -64,7 +64,11 @@ fn viewers_that_know_no_layers_get_r_g_and_b() {
         // Eleven bits of a half, rounded to the nearest.
         (ExrChannels::RgbHalf, "<f2", |x| {
             let unit = 2f64.powi(x.abs().log2().floor() as i32 - 10);
-            if x == 0.0 { 0.0 } else { ((x as f32 as f64 / unit).round_ties_even() * unit) as f32 }
+            if x == 0.0 {
+                0.0
+            } else {
+                ((x as f32 as f64 / unit).round_ties_even() * unit) as f32
+            }
         }),
     ] {
         write_exr(&path, &film, &described(&film), channels).unwrap();
@@ -260,7 +264,12 @@ fn a_full_disk_leaves_the_old_picture() {
     let film = whole_film();
     for format in [Format::Exr, Format::Png] {
         let error = format
-            .write(Path::new("/dev/full"), &film, &described(&film), &WriteOptions::default())
+            .write(
+                Path::new("/dev/full"),
+                &film,
+                &described(&film),
+                &WriteOptions::default(),
+            )
             .unwrap_err();
         assert!(!error.is_content());
         assert!(error.to_string().contains("no space left"), "{error}");

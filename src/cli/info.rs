@@ -78,7 +78,9 @@ fn of_film(path: &Path) -> Result<Info, Failure> {
             scene_text: provenance.scene_text.clone(),
         }),
         channels: Vec::new(),
-        entries: entries.map(|(k, v)| (k.to_owned(), v.to_string())).collect(),
+        entries: entries
+            .map(|(k, v)| (k.to_owned(), v.to_string()))
+            .collect(),
     })
 }
 
@@ -127,7 +129,10 @@ impl Info {
                     }
                     if several.len() > LISTED {
                         let more = several.len() - LISTED;
-                        line("", &format!("and {more} more rectangles (--json lists them)"));
+                        line(
+                            "",
+                            &format!("and {more} more rectangles (--json lists them)"),
+                        );
                     }
                 }
             }

@@ -8,8 +8,8 @@ use crate::files::atomic;
 use crate::film::Film;
 use crate::provenance::Provenance;
 use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Image, Layer,
-    LayerAttributes, LineOrder, Text, Vec2, WritableImage, f16,
+    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Image,
+    Layer, LayerAttributes, LineOrder, Text, Vec2, WritableImage, f16,
 };
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;

@@ -38,7 +38,14 @@ fn films_and_pictures_say_the_same_of_themselves() {
     assert_eq!(film["film"]["coverage"][0][1], "8..24");
     assert!(exr["film"].is_null());
     let [film, exr, png] = [film, exr, png].map(|told| told["entries"].clone());
-    for key in ["scene_hash", "seed", "samples", "replicates", "adapter", "light"] {
+    for key in [
+        "scene_hash",
+        "seed",
+        "samples",
+        "replicates",
+        "adapter",
+        "light",
+    ] {
         assert!(film[key].is_string(), "{key}");
         assert_eq!(film[key], exr[key], "{key}");
         assert_eq!(film[key], png[key], "{key}");

@@ -147,7 +147,9 @@ fn the_cpu_reference_ends_after_half_a_minute_unless_told_otherwise() {
         .run("render box.toml --backend cpu --size 1024x768 -o a.png --report r.json")
         .success()
         .stderr(says("until 256 samples per pixel, or 30 s"))
-        .stderr(says("note: without a stop condition the CPU reference ends after 30 s"));
+        .stderr(says(
+            "note: without a stop condition the CPU reference ends after 30 s",
+        ));
     let report: serde_json::Value =
         serde_json::from_slice(&std::fs::read(bench.path("r.json")).unwrap()).unwrap();
     assert_eq!(report["stop_reason"], "time");
