@@ -198,7 +198,9 @@ fn bad_input_is_named() {
     std::fs::write(p.path("text.png"), "no picture").expect("written");
     run(&a, &p.path("text.png"), &["--max-flip", "1"])
         .code(2)
-        .stderr(contains("text.png: invalid PNG"));
+        .stderr(contains(
+            "text.png: not a PNG picture (text, such as a scene file)",
+        ));
     run(&a, &p.path("none.exr"), &[])
         .code(4)
         .stderr(contains("none.exr: cannot read: no such file"));

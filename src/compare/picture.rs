@@ -1,7 +1,7 @@
 //! Pictures to compare: EXR files, films, PNG files, and films in memory.
 
-use crate::files::FileError;
-use crate::files::open;
+use crate::files::kind::{self, FileKind};
+use crate::files::{FileError, open};
 use crate::film::Film;
 use crate::output::store;
 use crate::output::{Pixels, entries, read_exr};
@@ -39,32 +39,36 @@ pub struct Noise {
 
 impl Picture {
     /// Reads a picture by its extension: `.exr`, `.npz` (a film) or `.png`, which has no error layers. Under another name it may
-    /// be a film or an EXR file still, by its first bytes.
+    /// be one of these still, by its first bytes.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let mut file = open(path)?;
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-        let kind = extension.filter(|e| matches!(e.as_str(), "exr" | "npz" | "png"));
-        let kind = kind.or_else(|| {
-            let mut start = [0; 4];
-            file.read_exact(&mut start).ok()?;
-            match &start {
-                b"PK\x03\x04" => Some("npz".into()),
-                b"\x76\x2f\x31\x01" => Some("exr".into()),
-                _ => None,
+        let kind = match extension.as_deref() {
+            Some("exr") => Some(FileKind::Exr),
+            Some("npz") => Some(FileKind::Zip),
+            Some("png") => Some(FileKind::Png),
+            _ => {
+                let mut start = [0; 4];
+                let read = file.read_exact(&mut start);
+                FileKind::of(&start).filter(|_| read.is_ok())
             }
-        });
-        match kind.as_deref() {
-            Some("exr") => Self::from_exr(path),
-            Some("npz") => {
+        };
+        match kind {
+            Some(FileKind::Exr) => Self::from_exr(path),
+            Some(FileKind::Zip) => {
                 let (film, provenance) = store::load(path)?;
                 Self::from_film(path.display().to_string(), &film, &provenance)
                     .map_err(|why| FileError::content(path, why))
             }
-            Some("png") => Self::from_png(path),
-            _ => Err(FileError::content(
-                path,
-                "not a picture that can be compared (.exr, .png, or .npz film)",
-            )),
+            Some(FileKind::Png) => {
+                let wanted = Some(FileKind::Png);
+                Self::from_png(path).map_err(|e| kind::explain(e, "a PNG picture", wanted))
+            }
+            _ => {
+                let why = "not a picture that can be compared (.exr, .png, or .npz film)";
+                let error = FileError::content(path, why);
+                Err(kind::explain(error, "a picture or a film", None))
+            }
         }
     }
 

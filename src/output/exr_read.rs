@@ -1,5 +1,6 @@
 //! Reads OpenEXR pictures, written by this or another program.
 
+use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use exr::error::Error;
 use exr::image::{AnyChannel, AnyChannels, FlatSamples, Layer};
@@ -46,12 +47,13 @@ pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
         .read_to_end(&mut bytes)
         .map_err(|e| FileError::io(path, "cannot read", &e))?;
     // From memory: a damaged offset then can't make the system call fail, as if access were at fault.
-    decode(Cursor::new(bytes.as_slice())).map_err(|e| match e {
+    let result = decode(Cursor::new(bytes.as_slice())).map_err(|e| match e {
         Error::Io(e) => FileError::reading(path, &e),
         Error::Invalid(what) => FileError::content(path, format!("invalid EXR: {what}")),
         Error::NotSupported(what) => FileError::content(path, format!("unsupported EXR: {what}")),
         Error::Aborted => FileError::content(path, "reading was aborted"),
-    })
+    });
+    result.map_err(|e| kind::explain(e, "an EXR picture", Some(FileKind::Exr)))
 }
 
 fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
