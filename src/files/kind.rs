@@ -151,8 +151,11 @@ mod tests {
 
     /// Bytes of all values, as compressed data has them.
     fn noise(count: u64) -> Vec<u8> {
-        let byte = |i: u64| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 29) as u8;
-        (0..count).map(|i| byte(i ^ (i << 17))).collect()
+        let hash = |i: u64| {
+            let h = i.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            (h ^ (h >> 32)).wrapping_mul(0xbf58_476d_1ce4_e5b9)
+        };
+        (0..count).map(|i| (hash(i) >> 56) as u8).collect()
     }
 
     fn replaced(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {

@@ -8,6 +8,7 @@ mod program;
 mod bench;
 mod bits;
 mod files;
+mod kinds;
 mod said;
 mod selftest;
 mod status;
