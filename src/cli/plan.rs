@@ -174,7 +174,9 @@ pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
     let error = args
         .error
         .map(|e| format!("error {}", percent_without_zeros(e)));
-    let time = args.time.map(|t| clock(t.as_secs_f64()));
+    let time = args
+        .time
+        .map(|t| clock(t.as_secs_f64()).replace(".0 s", " s"));
     let conditions: Vec<String> = [samples, error, time].into_iter().flatten().collect();
     let text = match conditions.split_last() {
         Some((last, [])) if wanted < MAX_SAMPLES => last.clone(),
@@ -217,6 +219,7 @@ mod tests {
             ("--error 2% --time 10m", "until error 2 % or 10 min"),
             ("--error 0.0005", "until error 0.05 %"),
             ("--time 90s --adaptive", "until 90 s, adaptive"),
+            ("--time 8s", "until 8 s"),
             (
                 "--spp 300 --error 7% --time 1h30m",
                 "until 300 spp, error 7 % or 90 min",

@@ -317,7 +317,7 @@ pub fn clock(seconds: f64) -> String {
     match whole {
         0..=9 => format!("{seconds:.1} s"),
         10..=119 => format!("{whole} s"),
-        120..=7199 if whole % 60 == 0 => format!("{} min", whole / 60),
+        120..=7199 if whole.is_multiple_of(60) => format!("{} min", whole / 60),
         120..=7199 => format!("{} min {} s", whole / 60, whole % 60),
         _ if whole % 3600 < 60 => format!("{} h", whole / 3600),
         _ => format!("{} h {} min", whole / 3600, whole % 3600 / 60),

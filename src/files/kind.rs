@@ -51,6 +51,11 @@ impl FileKind {
             _ => None,
         }
     }
+
+    /// The same for a file that should be text.
+    pub fn of_no_text(start: &[u8]) -> Option<Self> {
+        Self::of(start).filter(|kind| !matches!(kind, Self::Text | Self::Empty))
+    }
 }
 
 impl fmt::Display for FileKind {

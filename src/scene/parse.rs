@@ -75,9 +75,7 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
         )));
     }
 
-    if let Some(kind) =
-        FileKind::of(&bytes).filter(|k| !matches!(k, FileKind::Text | FileKind::Empty))
-    {
+    if let Some(kind) = FileKind::of_no_text(&bytes) {
         return Err(invalid(format!("not a scene ({kind})")));
     }
     match String::from_utf8(bytes) {

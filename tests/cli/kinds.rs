@@ -1,6 +1,6 @@
 //! Files of another kind than is expected, or with changed line ends: what they are is said, wherever they are read.
 
-use crate::program::{Bench, says};
+use crate::program::{Bench, SCENE, says};
 use predicates::prelude::*;
 use std::fs;
 
@@ -50,6 +50,17 @@ fn what_is_no_scene_is_named() {
         let render = format!("render {name} --backend cpu --spp 1 -o b.png");
         bench.run(&render).code(status).stderr(text);
     }
+}
+
+#[test]
+fn what_is_no_table_of_a_scene_is_named() {
+    let bench = with_all_kinds();
+    let rows = "[[spheres]]\nfile = \"lfs.exr\"\nmaterial = \"white\"\n";
+    fs::write(bench.path("rows.toml"), format!("{SCENE}\n{rows}")).unwrap();
+    bench
+        .run("check rows.toml")
+        .code(2)
+        .stderr(says("error: lfs.exr: not a CSV file (a git-lfs pointer"));
 }
 
 #[test]
