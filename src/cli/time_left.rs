@@ -9,11 +9,10 @@ const FIRST_SECONDS: f64 = 2.0;
 /// Seconds after which it counts although it is not stable.
 const PATIENCE: f64 = 15.0;
 
-/// A forecast is stable if the end has moved by no more than this share of the time left since an earlier one, which was made
-/// when less than 1 / [`LATER`] of the time had passed.
+/// A forecast is stable if the end that it expects is that of an earlier one, but for this share of the time left.
 const STABLE: f64 = 0.1;
 
-/// See [`STABLE`].
+/// Factor between the times of these two forecasts. Compared with the one just before, a forecast that falls slowly would be stable.
 const LATER: f64 = 1.5;
 
 /// Seconds over which forecasts are averaged.

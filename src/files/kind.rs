@@ -139,14 +139,14 @@ pub fn explain(error: FileError, what: &str, wanted: Option<FileKind>) -> FileEr
     FileError::Content { path, message }
 }
 
-/// The first bytes of a file. A pipe has given its bytes away already.
+/// The first bytes of a file. Not of a pipe: it has given them away already, and opening it again may wait for ever.
 fn start_of(path: &Path) -> Option<Vec<u8>> {
-    let file = File::open(path).ok()?;
-    let is_file = file.metadata().ok()?.is_file();
+    if !std::fs::metadata(path).ok()?.is_file() {
+        return None;
+    }
     let mut start = Vec::new();
-    file.take(if is_file { LOOKED_AT } else { return None })
-        .read_to_end(&mut start)
-        .ok()?;
+    let mut file = File::open(path).ok()?.take(LOOKED_AT);
+    file.read_to_end(&mut start).ok()?;
     Some(start)
 }
 

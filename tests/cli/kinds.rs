@@ -182,3 +182,17 @@ fn a_picture_equals_itself_without_limits() {
         .success()
         .stdout(says("within the limits"));
 }
+
+/// A pipe can be read only once, so that nothing can be looked up in it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_pipe_is_not_opened_twice() {
+    let bench = Bench::new();
+    let script = "mkfifo pipe && { printf 'no film at all' > pipe & } && timeout 20 \"$0\" develop pipe -o b.png";
+    assert_eq!(bench.shell(&[], script), 2, "{}", bench.said());
+    assert!(
+        bench.said().contains("pipe: not a film: "),
+        "{}",
+        bench.said()
+    );
+}
