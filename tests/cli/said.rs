@@ -112,7 +112,7 @@ fn quiet_is_quiet_everywhere() {
         "merge g.npz f.npz",
         "compare a.exr a.exr --html c.html",
         "make-scene spheres --count 3",
-        "selftest --backend cpu --filter dome",
+        "selftest --backend cpu --filter incidence",
         "regress scenes --bless --backend cpu --power 100%",
         "regress scenes --backend cpu --junit -",
         "bench box.toml --engine cpu --seeds 1 --max-spp 2 --reference-spp 16 --size 4x4 --cache c --json -",
