@@ -84,6 +84,25 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
+    /// Name, kind and driver in few words: `llvmpipe (software, Mesa 22.3.6)`.
+    pub fn brief(&self) -> String {
+        fn first(text: &str) -> &str {
+            text.split(" (").next().unwrap_or(text)
+        }
+        let (name, driver) = (first(&self.name), first(&self.driver));
+        let driver = driver.strip_prefix(name).unwrap_or(driver).trim();
+        let is_software_adapter = self.software && self.backend != "cpu";
+        let kind = is_software_adapter.then_some("software");
+        let kind_and_driver: Vec<&str> = kind
+            .into_iter()
+            .chain(Some(driver).filter(|driver| !driver.is_empty()))
+            .collect();
+        match kind_and_driver[..] {
+            [] => name.into(),
+            _ => format!("{name} ({})", kind_and_driver.join(", ")),
+        }
+    }
+
     /// Whether samples have the same bits on both devices. The CPU reference's number of threads does not matter.
     pub fn rounds_like(&self, other: &Self) -> bool {
         (&self.name, &self.backend) == (&other.name, &other.backend)
@@ -125,4 +144,52 @@ pub enum EngineError {
     /// The device was lost, ran out of memory, or misbehaved.
     #[error("{0}")]
     Device(String),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_are_named_in_few_words() {
+        for (name, driver, backend, software, brief) in [
+            (
+                "llvmpipe (LLVM 15.0.6, 512 bits)",
+                "llvmpipe Mesa 22.3.6 (LLVM 15.0.6)",
+                "gpu",
+                true,
+                "llvmpipe (software, Mesa 22.3.6)",
+            ),
+            (
+                "NVIDIA H200",
+                "NVIDIA 550.54.15",
+                "gpu",
+                false,
+                "NVIDIA H200 (NVIDIA 550.54.15)",
+            ),
+            (
+                "AMD Radeon RX 6800 (RADV NAVI21)",
+                "radv Mesa 24.0.1",
+                "gpu",
+                false,
+                "AMD Radeon RX 6800 (radv Mesa 24.0.1)",
+            ),
+            (
+                "CPU reference (f64)",
+                "2 threads",
+                "cpu",
+                true,
+                "CPU reference (2 threads)",
+            ),
+            ("X", "", "gpu", false, "X"),
+        ] {
+            let device = DeviceInfo {
+                name: name.into(),
+                driver: driver.into(),
+                backend: backend.into(),
+                software,
+            };
+            assert_eq!(device.brief(), brief);
+        }
+    }
 }

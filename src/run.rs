@@ -158,6 +158,8 @@ pub struct Run<'a> {
     pixels: u64,
     /// What [`Tally::samples`] was at first.
     samples_before: f64,
+    /// Samples and seconds after the first call, which a driver may use to compile.
+    first: Option<(f64, f64)>,
 }
 
 impl<'a> Run<'a> {
@@ -191,6 +193,7 @@ impl<'a> Run<'a> {
             widest: job.tiles.iter().map(Rect::area).max().unwrap_or(0),
             pixels,
             samples_before: samples,
+            first: None,
         }
     }
 
@@ -248,6 +251,8 @@ impl<'a> Run<'a> {
         if done {
             self.tally.samples += paths(parts) / self.pixels as f64;
             self.tally.complete = self.tally.complete || is_complete(&self.film.coverage, self.job);
+            self.first
+                .get_or_insert((self.tally.samples, self.tally.seconds));
         }
         Ok(done)
     }
@@ -326,7 +331,12 @@ impl<'a> Run<'a> {
     fn forecast(&self) -> Option<Forecast> {
         let job = self.job;
         let done = self.tally.samples;
-        let per_sample = self.tally.seconds / (done - self.samples_before);
+        // The first call counts only while there is no other.
+        let (samples, seconds) = self
+            .first
+            .filter(|first| done > first.0)
+            .unwrap_or((self.samples_before, 0.0));
+        let per_sample = (self.tally.seconds - seconds) / (done - samples);
         let mut needed = (job.samples.end - job.samples.start) as f64;
         if let Some(time) = job.time {
             let in_time = done + (time.as_secs_f64() - self.tally.seconds) / per_sample;

@@ -99,6 +99,30 @@ impl Overrides {
         ];
         all.into_iter().filter(|f| f.1).map(|f| f.0).collect()
     }
+
+    /// The flags to add so that `resolved` becomes `held`, where the scene file has got other values since.
+    pub fn to_add(&self, held: &Settings, resolved: &Settings) -> Vec<String> {
+        let ([w, h], [depth, strata, seed]) = (held.size, [held.max_depth, held.strata, held.seed]);
+        let all = [
+            (
+                self.size.is_none() && resolved.size != held.size,
+                format!("--size {w}x{h}"),
+            ),
+            (
+                self.max_depth.is_none() && resolved.max_depth != depth,
+                format!("--max-depth {depth}"),
+            ),
+            (
+                self.strata.is_none() && resolved.strata != strata,
+                format!("--strata {strata}"),
+            ),
+            (
+                self.seed.is_none() && resolved.seed != seed,
+                format!("--seed {seed}"),
+            ),
+        ];
+        all.into_iter().filter(|f| f.0).map(|f| f.1).collect()
+    }
 }
 
 /// Which hints of a scene file differ from those of an older version of it.

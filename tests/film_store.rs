@@ -164,7 +164,7 @@ fn every_truncation_is_detected() {
     let text = refused(&path, &[&good[..], b"x"].concat());
     assert!(text.contains("extra bytes at the end"), "{text}");
     let text = refused(&path, b"");
-    assert!(text.contains("not a film: it is empty"), "{text}");
+    assert!(text.contains("not a film (an empty file)"), "{text}");
 }
 
 #[test]
@@ -174,20 +174,20 @@ fn other_kinds_of_files_are_named() {
     let zip = b"PK\x03\x04\x14\0\0\0\x08\0".repeat(50);
     let png = b"\x89PNG\r\n\x1a\n".repeat(50);
     for (bytes, what) in [
-        (vec![0; 5000], "it is not a NumPy archive (.npz)"),
+        (vec![0; 5000], ": it is not a NumPy archive (.npz)"),
         (
             b"title = \"x\"\n".repeat(100),
-            "it is not a NumPy archive (.npz)",
+            " (text, such as a scene file)",
         ),
-        (png, "it is a PNG picture"),
+        (png, " (a PNG picture)"),
         (
             zip,
-            "it is a ZIP archive, but its first array is not \"provenance\"",
+            ": it is a ZIP archive, but its first array is not \"provenance\"",
         ),
     ] {
         let text = refused(&path, &bytes);
         assert!(
-            text.ends_with(&format!("film.npz: not a film: {what}")),
+            text.ends_with(&format!("film.npz: not a film{what}")),
             "{text}"
         );
     }

@@ -235,14 +235,12 @@ fn bad_input_never_passes() {
 fn invalid_scenes_are_named_even_without_a_golden() {
     let f = Folder::new(&["good"]);
     f.put("bad", "nonsense");
-    std::fs::create_dir(f.path("folder.toml")).expect("made");
     f.run(&[])
         .code(2)
         .stdout(contains("unusable  bad: ").and(contains("bad.toml:1:")))
-        .stdout(contains("folder.toml: cannot read: is a directory"))
         .stdout(
             contains("good.exr does not exist; create it with --bless")
-                .and(contains("3 scenes: 1 new, 2 unusable")),
+                .and(contains("2 scenes: 1 new, 1 unusable")),
         );
     // Each stands in one list alone, and a quiet run says nothing else.
     let done = f.run(&["--quiet"]);
@@ -250,6 +248,48 @@ fn invalid_scenes_are_named_even_without_a_golden() {
     let out = String::from_utf8_lossy(&done.stdout).into_owned();
     assert_eq!(out.matches("good: ").count(), 1, "{out}");
     assert!(done.stderr.is_empty());
+}
+
+#[test]
+fn hidden_files_and_folders_are_no_scenes() {
+    let f = Folder::new(&["good"]);
+    f.put(".hidden", "nonsense");
+    f.put("._good", "nonsense");
+    std::fs::create_dir(f.path("folder.toml")).expect("made");
+    std::fs::write(f.path("LOUD.TOML"), "nonsense").expect("written");
+    f.run(&["--bless"])
+        .code(0)
+        .stdout(contains("1 scene: 1 blessed"))
+        .stderr(contains(
+            "LOUD.TOML is ignored: the name of a scene ends in .toml",
+        ));
+    std::fs::write(f.path("golden/._good.exr"), "nonsense").expect("written");
+    f.run(&[]).code(0).stdout(contains("1 scene: 1 passed"));
+}
+
+/// A golden that git-lfs has not fetched is no regression, and says what to do.
+#[test]
+fn goldens_that_git_has_not_fetched_or_has_changed_are_named() {
+    let f = Folder::new(&["one"]);
+    f.run(&["--bless", "--max-spp", "64"]).code(0);
+    let golden = f.path("golden/one.exr");
+    let good = std::fs::read(&golden).expect("there");
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1\n";
+    std::fs::write(&golden, pointer).expect("written");
+    f.run(&[])
+        .code(2)
+        .stdout(contains("unusable  one: ").and(contains(
+            "not an EXR picture (a git-lfs pointer; `git lfs pull`",
+        )));
+    let mut changed = Vec::new();
+    for byte in good {
+        changed.extend((byte == b'\n').then_some(b'\r'));
+        changed.push(byte);
+    }
+    std::fs::write(&golden, changed).expect("written");
+    f.run(&[])
+        .code(2)
+        .stdout(contains("one.exr: damaged: its line ends were changed"));
 }
 
 #[test]

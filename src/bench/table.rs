@@ -4,6 +4,10 @@ use super::figure9::{Cell, RAYS};
 use super::summary::{Spread, millions, slope};
 use super::{EngineKind, Point, Results};
 
+/// Columns that fit a terminal or a page. Wider tables are for those who ask for all columns.
+#[cfg(test)]
+pub(super) const NARROW: usize = 100;
+
 /// Columns of text. The first one and `on` are aligned left, the others right.
 pub(super) struct Columns(Vec<Vec<String>>);
 
@@ -39,41 +43,45 @@ impl Columns {
     }
 }
 
-/// Everything about one scene. Spreads are standard deviations of a single seed.
-pub fn text(results: &Results) -> String {
+/// The results of one scene: the most important columns, or all of them. Spreads are standard deviations of a single seed.
+pub fn text(results: &Results, wide: bool) -> String {
     let [width, height] = results.settings.size;
     let mut text = format!(
         "{}: {width}x{height}, mean path length {:.1}\n",
         results.scene, results.mean_path_length
     );
-    text += &reference(results);
+    text += &reference(results, wide);
     if results.measurements.is_empty() {
         return text + "nothing measured\n";
     }
     let points = results.points();
-    text += &format!("\n{}", engines(results));
+    text += &format!("\n{}", engines(results, wide));
     text += &format!("\n{}", speed(&points));
-    text += &format!("\n{}", errors(&points));
+    text += &format!("\n{}", errors(&points, wide));
     text + &reference_note(results, &points)
 }
 
-fn reference(results: &Results) -> String {
+fn reference(results: &Results, wide: bool) -> String {
     let r = &results.reference;
+    // The engine, and after it the device and the kernel.
+    let about = r.about.split(';').next().filter(|_| !wide);
+    let about = about.unwrap_or(&r.about);
     let samples = r
         .samples
         .map_or(String::new(), |n| format!(", {n} samples per pixel"));
     let noise = match r.truth.noise_floor() {
         Some(error) => format!(
-            ", relative error {}, which is subtracted from squared errors (not from FLIP)",
-            percent(error)
+            ", relative error {} (subtracted from squared errors{})",
+            percent(error),
+            if wide { ", not from FLIP" } else { "" }
         ),
-        None => ", which does not state its noise, so its noise counts as error".into(),
+        None => ", states no noise, so its noise counts as error".into(),
     };
     let kept = match &r.path {
-        Some(path) if r.cached => format!(" (cached in {})", path.display()),
+        Some(path) if r.cached => format!("cached in {}\n", path.display()),
         _ => String::new(),
     };
-    format!("reference: {}{samples}{noise}{kept}\n", r.about)
+    format!("reference: {about}{samples}{noise}\n{kept}")
 }
 
 /// A reference whose stated relative error is more than this share of a picture's error is called short.
@@ -95,7 +103,7 @@ fn reference_note(results: &Results, points: &[Point]) -> String {
     }
 }
 
-fn engines(results: &Results) -> String {
+fn engines(results: &Results, wide: bool) -> String {
     let mut columns = Columns::new(&["engine", "compile, s", "warm-up, s", "slope", "on"]);
     for e in &results.entrants {
         let slope = slope(e.kind, &results.measurements);
@@ -107,7 +115,11 @@ fn engines(results: &Results) -> String {
                 Some(sd) => format!("{:.2} ± {sd:.2}", s.mean),
                 None => format!("{:.2}", s.mean),
             }),
-            format!("{} ({})", e.device.name, e.device.driver),
+            if wide {
+                format!("{} ({})", e.device.name, e.device.driver)
+            } else {
+                e.device.brief()
+            },
         ]);
     }
     columns.text()
@@ -137,40 +149,37 @@ fn speed(points: &[Point]) -> String {
     columns.text()
 }
 
-fn errors(points: &[Point]) -> String {
-    let mut columns = Columns::new(&[
-        "engine",
-        "samples",
-        "MSE",
-        "claimed MSE",
-        "relative MSE",
-        "trimmed",
-        "FLIP",
-        "error",
-        "claimed error",
-        "efficiency",
-        "ratio",
-    ]);
+fn errors(points: &[Point], wide: bool) -> String {
     // The uncertainty that the pictures state, not the spread between them.
     let claimed = |p: &Point| match (p.claimed_relative_error, p.claimed_uncertainty) {
         (Some(error), Some(by)) => format!("{} \u{b1} {}", percent(error.mean), percent(by.mean)),
         (error, _) => error.map_or("-".into(), |e| percent(e.mean)),
     };
     let share = |s: Option<Spread>| s.map_or("-".into(), |s| with_spread(percent(s.mean), s));
+    // Each column, and whether only a wide table has it.
+    type Cell<'a> = &'a dyn Fn(&Point) -> String;
+    let all: [(&str, bool, Cell); 11] = [
+        ("engine", false, &|p| p.engine.name().into()),
+        ("samples", false, &|p| p.samples.to_string()),
+        ("MSE", false, &|p| cell(p.mse)),
+        ("claimed MSE", true, &|p| {
+            p.claimed_mse.map_or("-".into(), cell)
+        }),
+        ("relative MSE", true, &|p| cell(p.relative_mse)),
+        ("trimmed", true, &|p| cell(p.trimmed_relative_mse)),
+        ("FLIP", true, &|p| cell(p.flip)),
+        ("error", false, &|p| share(p.true_relative_error)),
+        ("claimed error", false, &claimed),
+        ("efficiency", false, &|p| {
+            p.efficiency.map_or("-".into(), cell)
+        }),
+        ("ratio", false, &|p| p.ratio.map_or("-".into(), cell)),
+    ];
+    let shown: Vec<_> = all.iter().filter(|c| wide || !c.1).collect();
+    let head: Vec<&str> = shown.iter().map(|c| c.0).collect();
+    let mut columns = Columns::new(&head);
     for p in points {
-        columns.push(vec![
-            p.engine.name().into(),
-            p.samples.to_string(),
-            cell(p.mse),
-            p.claimed_mse.map_or("-".into(), cell),
-            cell(p.relative_mse),
-            cell(p.trimmed_relative_mse),
-            cell(p.flip),
-            share(p.true_relative_error),
-            claimed(p),
-            p.efficiency.map_or("-".into(), cell),
-            p.ratio.map_or("-".into(), cell),
-        ]);
+        columns.push(shown.iter().map(|c| c.2(p)).collect());
     }
     columns.text()
 }
@@ -257,6 +266,45 @@ mod tests {
         assert_eq!(cell(s), "2.00 ±2.5%");
         assert_eq!(cell(Spread { sd: None, ..s }), "2.00");
         assert_eq!(percent(0.0213), "2.13%");
+    }
+
+    /// With numbers as long as they get.
+    #[test]
+    fn tables_fit_unless_they_are_wide() {
+        let long = Spread {
+            mean: 1.2345e-3,
+            sd: Some(1.5e-3),
+        };
+        let point = Point {
+            engine: EngineKind::GpuBuffers,
+            samples: 1 << 20,
+            seeds: 4,
+            seconds: long,
+            read_back: long,
+            paths_per_second: long,
+            rays_per_second: long,
+            rays_per_path: long,
+            mse: long,
+            claimed_mse: Some(long),
+            relative_mse: long,
+            trimmed_relative_mse: long,
+            flip: long,
+            true_relative_error: Some(long),
+            claimed_relative_error: Some(long),
+            claimed_uncertainty: Some(long),
+            efficiency: Some(long),
+            ratio: Some(long),
+        };
+        let widest = |text: &str| text.lines().map(|l| l.chars().count()).max().unwrap();
+        let points = [point];
+        let (speed, narrow) = (speed(&points), errors(&points, false));
+        assert!(widest(&speed) <= NARROW, "{speed}");
+        assert!(
+            widest(&narrow) <= NARROW && !narrow.contains("FLIP"),
+            "{narrow}"
+        );
+        let wide = errors(&points, true);
+        assert!(widest(&wide) > NARROW && wide.contains("FLIP"), "{wide}");
     }
 
     #[test]

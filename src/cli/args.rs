@@ -76,10 +76,10 @@ Example:
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Talk {
     /// Print only warnings and errors
-    #[arg(long)]
+    #[arg(short, long)]
     pub quiet: bool,
-    /// How to show progress: auto is a bar on a terminal and a line every few seconds elsewhere, plain is always
-    /// lines, none is nothing
+    /// How to show progress: auto is a bar on a terminal and lines elsewhere, plain is always lines, none is nothing. A line comes
+    /// every 5 seconds at first, later every minute
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto, value_name = "STYLE")]
     pub progress: ProgressStyle,
     /// Threads for the CPU reference or a software adapter [default: as many cores as the process may use]
@@ -134,6 +134,9 @@ pub struct MakeSceneArgs {
     /// Replace files that exist with other contents
     #[arg(long)]
     pub force: bool,
+    /// Print only errors
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// What `etendue make-scene` makes.
@@ -150,7 +153,7 @@ pub enum SceneKind {
 pub enum ProgressStyle {
     /// A bar on a terminal, lines elsewhere.
     Auto,
-    /// A line every few seconds.
+    /// A line now and then.
     Plain,
     /// Nothing.
     None,

@@ -34,8 +34,11 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
         max_flip: args.max_flip,
         max_relative_rmse: args.max_relative_rmse,
     };
-    let comparison =
+    let mut comparison =
         compare_pictures(&a, &b, &limits).map_err(|e| Failure::Input(e.to_string()))?;
+    if is_same_file(&args.a, &args.b) {
+        comparison.notes = vec!["both names lead to the same file".into()];
+    }
     progress.finish();
     write_stdout(&comparison.report())?;
     if let Some(path) = &args.html {
@@ -50,4 +53,10 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     } else {
         Err(Failure::Said(1))
     }
+}
+
+/// Whether two names lead to one file.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    real(a).is_some_and(|a| Some(a) == real(b))
 }

@@ -47,7 +47,9 @@ pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
         .rev()
         .map(|f| f.0.display().to_string())
         .collect();
-    say!("wrote {}", names.join(", "));
+    if !args.quiet {
+        say!("wrote {}", names.join(", "));
+    }
     Ok(())
 }
 

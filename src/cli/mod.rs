@@ -21,11 +21,13 @@ mod schema;
 mod selftest;
 mod signals;
 mod stages;
+mod time_left;
 mod values;
 
 use crate::files::FileError;
 use args::{Cli, Command};
 use clap::Parser;
+use clap::error::{ContextKind, ContextValue};
 use failure::Failure;
 use std::io::{self, Write};
 use std::path::Path;
@@ -44,7 +46,8 @@ pub(crate) use say;
 pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(e) => {
+        Err(mut e) => {
+            suggest_render(&mut e);
             // Help and version go to stdout and are not errors. Neither is a closed stdout.
             let _ = e.print();
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
@@ -72,6 +75,21 @@ pub fn main() -> ExitCode {
             failure.print();
             ExitCode::from(failure.status())
         }
+    }
+}
+
+/// Suggests `render` where a scene stands in place of a command.
+fn suggest_render(e: &mut clap::Error) {
+    if let Some(ContextValue::String(word)) = e.get(ContextKind::InvalidSubcommand)
+        && Path::new(word)
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    {
+        let tip = format!("to render a scene: etendue render {word}");
+        e.insert(
+            ContextKind::Suggested,
+            ContextValue::StyledStrs(vec![tip.into()]),
+        );
     }
 }
 

@@ -11,7 +11,7 @@ use crate::render::plan::end_for;
 use crate::render::{DEFAULT_SPP, MAX_SAMPLES};
 use crate::scene::Scene;
 use crate::settings::Settings;
-use crate::stats::percent;
+use crate::stats::percent_to;
 use std::ops::Range;
 use std::path::Path;
 use std::time::Duration;
@@ -172,26 +172,82 @@ pub fn samples_text(film: &Film) -> String {
     }
 }
 
-/// The stop conditions, for the start-up line.
+/// `120 spp`, or `119 to 120 spp`.
+pub fn brief_samples(film: &Film) -> String {
+    match film.coverage.samples() {
+        (a, b) if a == b => format!("{a} spp"),
+        (a, b) => format!("{a} to {b} spp"),
+    }
+}
+
+/// The stop conditions in few words: `256 spp`, `until error 2 % or 10 min`.
 pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
-    let mut conditions = Vec::new();
     if let Some(range) = &args.samples {
-        conditions.push(format!("samples {}..{} are done", range.start, range.end));
+        return Ok(format!("samples {}..{}", range.start, range.end));
+    }
+    let wanted = wanted(args, settings)?;
+    let samples = (wanted < MAX_SAMPLES).then(|| format!("{wanted} spp"));
+    let error = args
+        .error
+        .map(|e| format!("error {}", percent_without_zeros(e)));
+    let time = args
+        .time
+        .map(|t| clock(t.as_secs_f64()).replace(".0 s", " s"));
+    let conditions: Vec<String> = [samples, error, time].into_iter().flatten().collect();
+    let text = match conditions.split_last() {
+        Some((last, [])) if wanted < MAX_SAMPLES => last.clone(),
+        Some((last, [])) => format!("until {last}"),
+        Some((last, others)) => format!("until {} or {last}", others.join(", ")),
+        None => String::new(),
+    };
+    Ok(if args.adaptive {
+        text + ", adaptive"
     } else {
-        let wanted = wanted(args, settings)?;
-        if wanted < MAX_SAMPLES {
-            let mean = if args.adaptive { " on average" } else { "" };
-            conditions.push(count(wanted) + mean);
+        text
+    })
+}
+
+/// `2 %`, `0.05 %`.
+fn percent_without_zeros(share: f64) -> String {
+    let text = percent_to(share, 6);
+    let number = text.trim_end_matches(" %").trim_end_matches('0');
+    format!("{} %", number.trim_end_matches('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::parse::parse_str;
+    use clap::Parser;
+
+    #[test]
+    fn stop_conditions_in_few_words() {
+        let scene = parse_str(
+            Path::new("three_materials.toml"),
+            include_str!("../../scenes/three_materials.toml"),
+        )
+        .unwrap();
+        for (flags, text) in [
+            ("", "256 spp"),
+            ("--spp 1", "1 spp"),
+            ("--rays 8", "32 spp"),
+            ("--samples 0..512", "samples 0..512"),
+            ("--error 2% --time 10m", "until error 2 % or 10 min"),
+            ("--error 0.0005", "until error 0.05 %"),
+            ("--time 90s --adaptive", "until 90 s, adaptive"),
+            ("--time 8s", "until 8 s"),
+            (
+                "--spp 300 --error 7% --time 1h30m",
+                "until 300 spp, error 7 % or 90 min",
+            ),
+        ] {
+            let words = format!("etendue render x.toml {flags}");
+            let cli = super::super::args::Cli::try_parse_from(words.split_whitespace()).unwrap();
+            let super::super::args::Command::Render(args) = cli.command else {
+                panic!("{words}");
+            };
+            let settings = Settings::resolve(&scene, &args.overrides());
+            assert_eq!(ends(&args, &settings).unwrap(), text);
         }
     }
-    if let Some(error) = args.error {
-        conditions.push(format!(
-            "relative error {} (plus twice its uncertainty)",
-            percent(error)
-        ));
-    }
-    if let Some(time) = args.time {
-        conditions.push(format!("{} of rendering time", clock(time.as_secs_f64())));
-    }
-    Ok(format!("until {}", conditions.join(", or ")))
 }

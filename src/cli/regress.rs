@@ -10,7 +10,7 @@ use crate::compare::Limits;
 use crate::engine::Engine;
 use crate::files::{FileError, atomic};
 use crate::regress::report::{self, Done};
-use crate::regress::{Case, Outcome, Trouble, Wanted, bless, cases};
+use crate::regress::{Case, Outcome, Trouble, Wanted, almost_scenes, bless, cases};
 use crate::render::{Error, backend, memory};
 use crate::scene::parse;
 use crate::settings::Settings;
@@ -28,6 +28,12 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
     let cases = cases(&args.dir, args.filter.as_deref().unwrap_or(""))?;
+    if !args.talk.quiet {
+        for path in almost_scenes(&args.dir)? {
+            let path = path.display();
+            say!("note: {path} is ignored: the name of a scene ends in .toml");
+        }
+    }
     let usable = cases.iter().filter(|c| c.scene || !args.bless).count();
     if usable == 0 {
         let what = match &args.filter {
@@ -175,7 +181,9 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
     }
     list += &format!("{}\n", report::summary(done));
     if args.junit.as_deref().is_some_and(is_stdout) {
-        say!("{}", list.trim_end());
+        if !args.talk.quiet {
+            say!("{}", list.trim_end());
+        }
     } else {
         write_stdout(&list)?;
     }

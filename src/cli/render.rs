@@ -17,7 +17,7 @@ use crate::film::coverage::Rect;
 use crate::film::error::{Doubt, RelativeError};
 use crate::film::pilot::Pilot;
 use crate::gpu::Making;
-use crate::kernel;
+use crate::kernel::{self, Access};
 use crate::output::Format;
 use crate::output::report::{self, Report, Seconds};
 use crate::output::store;
@@ -123,10 +123,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         call: longest_call(args),
         adaptive: args.adaptive.then_some(settings.seed),
     };
-    if let Some(note) = &chosen.note {
-        say!("{note}");
-    }
     if !args.talk.quiet {
+        if let Some(note) = &chosen.note {
+            say!("{note}");
+        }
         say_start(args, &scene, &settings, &chosen, &job, &film)?;
         say_other_adapters(args, &provenance, chosen.engine.device());
     }
@@ -284,12 +284,20 @@ fn check_same_samples(
     new: &Provenance,
 ) -> Result<(), Failure> {
     held.same_samples(new).map_err(|differ| {
-        let flags = args.overrides().against(&held.settings);
-        let advice = if flags.is_empty() {
-            "give the scene of the film, or name another film".to_owned()
-        } else {
-            format!("leave out {}, or name another film", flags.join(" and "))
-        };
+        let flags = args.overrides();
+        let leave_out = flags.against(&held.settings);
+        let add = flags.to_add(&held.settings, &new.settings);
+        let mut advice = Vec::new();
+        if !leave_out.is_empty() {
+            advice.push(format!("leave out {}", leave_out.join(" and ")));
+        }
+        if !add.is_empty() {
+            advice.push(format!("add {}", add.join(" ")));
+        }
+        if advice.is_empty() {
+            advice.push("give the scene of the film".into());
+        }
+        let advice = format!("{}, or name another film", advice.join(" and "));
         let message =
             format!("this film can't be resumed; film and command line: {differ}; {advice}");
         FileError::content(path, message).into()
@@ -318,19 +326,19 @@ fn say_start(
     } else {
         format!(" ({pixels} pixels)")
     };
-    let device = chosen.engine.device();
+    let name = args.scene.file_stem().unwrap_or(args.scene.as_os_str());
     let mut text = format!(
-        "{}: {width}x{height}{part} on {} ({}{}), {}",
-        args.scene.display(),
-        device.name,
-        device.driver,
-        chosen
-            .access
-            .map_or(String::new(), |a| format!(", {} kernel", a.name())),
-        plan::ends(args, settings)?
+        "{}: {width}x{height}{part}, {}, on {}",
+        name.display(),
+        plan::ends(args, settings)?,
+        chosen.engine.device().brief()
     );
+    // Only what is out of the ordinary.
+    if let Some(access) = chosen.access.filter(|a| *a != Access::Baked) {
+        text += &format!(", {} kernel", access.name());
+    }
     if let (Some(path), false) = (&args.film, film.coverage.is_empty()) {
-        let held = plan::samples_text(film);
+        let held = plan::brief_samples(film);
         text += &format!("; {} holds {held}", path.display());
     }
     say!("{text}");

@@ -18,7 +18,7 @@ pub fn selftest(args: &SelftestArgs) -> Result<(), Failure> {
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
     let (gpu, note) = backend::open(args.backend, args.adapter.as_deref())?;
-    if let Some(note) = note {
+    if let Some(note) = note.filter(|_| !args.talk.quiet) {
         say!("{note}");
     }
     let backend = match gpu {

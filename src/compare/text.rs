@@ -18,6 +18,7 @@ impl Comparison {
                 verdict_sentence(v)
             ),
             Some(v) => format!("{}; also different by the given limits ({exceeded})", verdict_sentence(v)),
+            None if self.identical => "bit-identical".into(),
             None if exceeded.is_empty() => {
                 "within the limits (not a statistical test, since the pictures do not state their noise)".into()
             }

@@ -1,7 +1,8 @@
-//! Files: how they are written whole, held by one process at a time, and what can go wrong with them.
+//! Files: how they are written whole, held by one process at a time, what kind they are, and what can go wrong with them.
 
 pub mod atomic;
 mod error;
+pub mod kind;
 pub mod lock;
 mod resolve;
 

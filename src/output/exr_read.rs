@@ -1,5 +1,6 @@
 //! Reads OpenEXR pictures, written by this or another program.
 
+use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use exr::error::Error;
 use exr::image::{AnyChannel, AnyChannels, FlatSamples, Layer};
@@ -50,12 +51,13 @@ pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
 }
 
 fn failure(path: &Path, e: Error) -> FileError {
-    match e {
+    let error = match e {
         Error::Io(e) => FileError::reading(path, &e),
         Error::Invalid(what) => FileError::content(path, format!("invalid EXR: {what}")),
         Error::NotSupported(what) => FileError::content(path, format!("unsupported EXR: {what}")),
         Error::Aborted => FileError::content(path, "reading was aborted"),
-    }
+    };
+    kind::explain(error, "an EXR picture", Some(FileKind::Exr))
 }
 
 fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {

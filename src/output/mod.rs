@@ -18,6 +18,7 @@ pub use png::write_png;
 pub use png_read::{PngHeader, read_png, read_png_header};
 pub use report::Report;
 
+use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use crate::film::Film;
 use crate::provenance::Provenance;
@@ -45,8 +46,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// The kind of a file by its extension, in any case. Under another name it may be a film or an EXR file still, by its first
-    /// bytes.
+    /// The kind of a file by its extension, in any case. Under another name it may be one of these still, by its first bytes.
     pub fn of(path: &Path) -> Result<Self, FileError> {
         let mut file = open(path)?;
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -57,14 +57,16 @@ impl Kind {
             _ => {}
         }
         let mut start = [0; 4];
-        match file.read_exact(&mut start).map(|()| &start) {
-            Ok(b"PK\x03\x04") => Ok(Self::Film),
-            Ok(b"\x76\x2f\x31\x01") => Ok(Self::Exr),
-            Ok(b"\x89PNG") => Ok(Self::Png),
-            _ => Err(FileError::content(
-                path,
-                "not a picture that etendue reads (.exr, .png, or .npz film)",
-            )),
+        let read = file.read_exact(&mut start);
+        match FileKind::of(&start).filter(|_| read.is_ok()) {
+            Some(FileKind::Zip) => Ok(Self::Film),
+            Some(FileKind::Exr) => Ok(Self::Exr),
+            Some(FileKind::Png) => Ok(Self::Png),
+            _ => {
+                let why = "not a picture that etendue reads (.exr, .png, or .npz film)";
+                let error = FileError::content(path, why);
+                Err(kind::explain(error, "a picture or a film", None))
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Reads PNG pictures, written by this or another program.
 
+use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use png::{ColorType, DecodingError, Info, Reader, Transformations};
 use std::fs::File;
@@ -83,10 +84,11 @@ fn begin(
 }
 
 fn failure(path: &Path, e: DecodingError) -> FileError {
-    match e {
+    let error = match e {
         DecodingError::IoError(e) => FileError::reading(path, &e),
         other => FileError::content(path, format!("invalid PNG: {other}")),
-    }
+    };
+    kind::explain(error, "a PNG picture", Some(FileKind::Png))
 }
 
 fn texts(info: &Info) -> Vec<(String, String)> {

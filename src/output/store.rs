@@ -16,6 +16,7 @@
 use super::npz::{self, Array, Damage, Reader};
 use super::pixels::{Pixels, finite};
 use crate::files::atomic;
+use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use crate::film::coverage::{Coverage, Rect};
 use crate::film::pilot::Pilot;
@@ -223,7 +224,7 @@ fn reading<T>(
         .map_err(|e| FileError::io(path, "cannot read", &e))?
         .len();
     let reader = Reader::new(BufReader::with_capacity(1 << 18, file), length);
-    read(reader).map_err(|damage| match damage {
+    let result = read(reader).map_err(|damage| match damage {
         Damage::Io(e) if e.kind() == std::io::ErrorKind::OutOfMemory => FileError::Io {
             path: path.into(),
             message: format!("cannot read: not enough memory for a film of {length} bytes"),
@@ -231,7 +232,8 @@ fn reading<T>(
         Damage::Io(e) => FileError::reading(path, &e),
         Damage::Wrong(what) => FileError::content(path, format!("invalid film: {what}")),
         Damage::Alien(what) => FileError::content(path, format!("not a film: {what}")),
-    })
+    });
+    result.map_err(|e| kind::explain(e, "a film", Some(FileKind::Zip)))
 }
 
 fn read_header<R: Read>(reader: &mut Reader<R>) -> Result<Header, Damage> {

@@ -322,17 +322,36 @@ pub fn cases(dir: &Path, filter: &str) -> Result<Vec<Case>, FileError> {
         .collect())
 }
 
+/// Files of `dir` that would be scenes if their extension were in lower case.
+#[doc(hidden)]
+pub fn almost_scenes(dir: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let mut files = files(dir)?;
+    files.retain(|path| {
+        let extension = path.extension().unwrap_or_default();
+        extension != "toml" && extension.eq_ignore_ascii_case("toml")
+    });
+    Ok(files)
+}
+
 /// Names of the files of `dir` with an extension, without it.
 fn stems(dir: &Path, extension: &str) -> Result<Vec<String>, FileError> {
+    let mut files = files(dir)?;
+    files.retain(|path| path.extension().is_some_and(|e| e == extension));
+    let stem = |path: &PathBuf| Some(path.file_stem()?.to_string_lossy().into_owned());
+    Ok(files.iter().filter_map(stem).collect())
+}
+
+/// What is in `dir`, but for folders and hidden files, among them those that macOS puts beside others (`._NAME`).
+fn files(dir: &Path) -> Result<Vec<PathBuf>, FileError> {
     let unreadable = |e| FileError::io(dir, "cannot read", &e);
-    let mut names = Vec::new();
+    let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
-        if path.extension().is_some_and(|e| e == extension)
-            && let Some(stem) = path.file_stem()
-        {
-            names.push(stem.to_string_lossy().into_owned());
+        let entry = entry.map_err(unreadable)?;
+        let is_hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
+        let path = entry.path();
+        if !is_hidden && !path.is_dir() {
+            files.push(path);
         }
     }
-    Ok(names)
+    Ok(files)
 }

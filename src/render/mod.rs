@@ -23,6 +23,7 @@ use crate::scene::{
 };
 use crate::settings::{Integrator, LightParts, Overrides, Settings};
 use crate::world::World;
+use std::io::ErrorKind;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -65,6 +66,10 @@ fn one_a_line(diagnostics: &[Diagnostic]) -> String {
 impl From<ReadError> for Error {
     fn from(e: ReadError) -> Self {
         match e {
+            ReadError::Io { path, source } if source.kind() == ErrorKind::IsADirectory => {
+                let message = "not a scene (a directory)".into();
+                FileError::Io { path, message }.into()
+            }
             ReadError::Io { path, source } => {
                 FileError::io(&path, "cannot read the scene", &source).into()
             }

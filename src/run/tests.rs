@@ -9,6 +9,8 @@ struct Fake {
     device: DeviceInfo,
     calls: Vec<Vec<Part>>,
     nap: Duration,
+    /// How much longer the first call takes.
+    slow_start: Duration,
     fail_at: Option<usize>,
     seed: u32,
     /// Whether it ignores `reseed` and keeps its seed.
@@ -27,6 +29,7 @@ impl Fake {
             },
             calls: Vec::new(),
             nap: Duration::ZERO,
+            slow_start: Duration::ZERO,
             fail_at: None,
             seed: 0,
             deaf: false,
@@ -94,6 +97,9 @@ impl Engine for Fake {
             return Err(EngineError::Device("lost".into()));
         }
         std::thread::sleep(self.nap);
+        if self.calls.is_empty() {
+            std::thread::sleep(self.slow_start);
+        }
         for part in parts {
             self.add(film, part.rect, part.samples.clone());
         }
@@ -248,6 +254,27 @@ fn forecasts_of_the_error_are_accurate() {
         let off = needed / end;
         assert!((0.75..=1.3).contains(&off), "{needed} of {end}");
     }
+}
+
+/// A driver compiles in the first call.
+#[test]
+fn a_slow_first_call_is_not_in_the_forecast() {
+    let size = [8, 8];
+    let mut film = Film::new(size, Rect::whole(size), 2);
+    let job = job(size, 64, 0..20_000);
+    let mut engine = Fake::new();
+    engine.slow_start = Duration::from_millis(300);
+    let stop = AtomicBool::new(false);
+    let mut run = Run::new(&job, &mut engine, &mut film, &stop);
+    let mut left = Vec::new();
+    run.go(|_, tally| {
+        left.push(tally.forecast.expect("the end is known").left);
+        Ok::<(), EngineError>(())
+    })
+    .unwrap();
+    // 300 ms for each of 20 000 samples, and then what they take.
+    assert!(left[0] > 5000.0, "{}", left[0]);
+    assert!(left[2] < 60.0, "{}", left[2]);
 }
 
 #[test]

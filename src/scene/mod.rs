@@ -16,6 +16,7 @@ mod rows;
 pub mod schema;
 mod source;
 mod surfaces;
+mod syntax;
 mod value;
 
 pub(crate) use build::checked;

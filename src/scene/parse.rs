@@ -6,20 +6,16 @@ use super::reader::Reader;
 use super::source::{Faults, Source, quoted, suggestion};
 use super::value::Text;
 use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Scene};
-use super::{rows, schema};
+use super::{rows, schema, syntax};
+use crate::files::kind::FileKind;
 use crate::files::reason;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// The largest scene file that is read, in bytes; that is half a million spheres or more.
 pub const MAX_FILE_BYTES: u64 = 64 << 20;
-
-/// Texts up to this many bytes have all their syntax errors reported, longer ones the first: a
-/// large file of something else can have one error a byte.
-const MAX_RECOVERED_BYTES: usize = 1 << 16;
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -79,8 +75,14 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
         )));
     }
 
+    if let Some(kind) = FileKind::of_no_text(&bytes) {
+        return Err(invalid(format!("not a scene ({kind})")));
+    }
     match String::from_utf8(bytes) {
         Ok(text) => Ok(text),
+        Err(error) if is_binary(error.as_bytes()) => {
+            Err(invalid("not a scene (binary data)".into()))
+        }
         Err(error) => {
             let (good, bad) = error.as_bytes().split_at(error.utf8_error().valid_up_to());
             let good = String::from_utf8_lossy(good);
@@ -93,6 +95,13 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
             Err(ReadError::Invalid(vec![place]))
         }
     }
+}
+
+/// Whether bytes that are not UTF-8 are no text of another encoding either, by git's rule: there is a NUL among the first 8000.
+/// UTF-16, which its first two bytes tell, has them too.
+fn is_binary(bytes: &[u8]) -> bool {
+    let is_utf16 = bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff");
+    !is_utf16 && bytes.iter().take(8000).any(|b| *b == 0)
 }
 
 /// The scene in `text`; `path` names it in messages. There is at least one message in an error.
@@ -114,47 +123,12 @@ pub(super) fn parse_with_rows(
 
 fn parse(source: Source) -> Result<Scene, Vec<Diagnostic>> {
     let mut faults = Faults::new();
-    let scene = syntax(&source, &mut faults).and_then(|root| scene(&source, &root, &mut faults));
+    let scene =
+        syntax::tables(&source, &mut faults).and_then(|root| scene(&source, &root, &mut faults));
     match scene {
         Some(scene) if faults.is_empty() => Ok(scene),
         _ => Err(faults.into_diagnostics(&source)),
     }
-}
-
-/// The file as tables; none if it is not valid TOML.
-fn syntax<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeTable<'a>> {
-    let text = source.text();
-    if let Some(at) = text.find('\0') {
-        let message = "found a NUL character; a scene file is TOML text".into();
-        faults.push(Some(at), message);
-        return None;
-    }
-    let (root, errors) = if text.len() <= MAX_RECOVERED_BYTES {
-        DeTable::parse_recoverable(text)
-    } else {
-        match DeTable::parse(text) {
-            Ok(root) => (root, Vec::new()),
-            Err(error) => (Spanned::new(0..0, DeTable::new()), vec![error]),
-        }
-    };
-    for error in &errors {
-        let span = error.span().unwrap_or(0..0);
-        let found = source.quote(span.clone());
-        let message = match error.message() {
-            "duplicate key" => format!(
-                "duplicate {}: keys and [tables] must be unique; only [[tables]] can repeat",
-                quoted(&found)
-            ),
-            // The parser treats anything that is not another value as a string.
-            message if found.is_empty() && message.starts_with("string values must be quoted") => {
-                "not TOML: a value is missing".into()
-            }
-            message if found.is_empty() => format!("not TOML: {message}"),
-            message => format!("not TOML: {message}; found `{found}`"),
-        };
-        faults.push(Some(span.start), message);
-    }
-    errors.is_empty().then(|| root.into_inner())
 }
 
 /// The whole scene; none when anything is wrong, which has been reported.

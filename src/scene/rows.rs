@@ -6,6 +6,7 @@
 use super::source::{Source, quoted, suggestion};
 use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius};
 use super::{Diagnostic, Light, Place, Primitive, Shape};
+use crate::files::kind::FileKind;
 use crate::files::reason;
 use glam::DVec3;
 use std::fs::File;
@@ -93,6 +94,10 @@ pub(super) fn read(path: &Path) -> Result<String, Wrong> {
     if bytes.len() as u64 > MAX_ROWS_BYTES {
         let limit = MAX_ROWS_BYTES >> 20;
         let message = format!("the file is too large; a CSV file has at most {limit} MiB");
+        return Err(wrong(Place::default(), message));
+    }
+    if let Some(kind) = FileKind::of_no_text(&bytes) {
+        let message = format!("not a CSV file ({kind})");
         return Err(wrong(Place::default(), message));
     }
     String::from_utf8(bytes).map_err(|e| {

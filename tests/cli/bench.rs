@@ -131,6 +131,10 @@ fn json_lines_contain_all_measurements() {
     ] {
         assert!(table.contains(word), "no {word} in {table}");
     }
+    assert!(table.lines().all(|l| l.chars().count() <= 100));
+    assert!(!table.contains("FLIP  "), "{table}");
+    let wide = bench.run(&format!("{SMALL} --wide")).success();
+    wide.stdout(says("claimed MSE").and(says("FLIP  ")));
     let lines = json_lines(&output.stdout);
     let [reference] = of_type(&lines, "reference")[..] else {
         panic!("one reference: {lines:?}");

@@ -232,7 +232,24 @@ fn a_changed_scene_file_does_not_resume_another_film() {
     bench
         .run("render changed.toml --backend cpu --spp 8 --film f.npz")
         .code(2)
-        .stderr(says("size is 24x16 and 12x8"));
+        .stderr(says(
+            "size is 24x16 and 12x8; add --size 24x16, or name another film",
+        ));
+    bench
+        .run("render changed.toml --backend cpu --spp 8 --film f.npz --size 24x16")
+        .success();
+    // A flag that contradicts, and a value of the file.
+    let changed = SCENE.replace("[camera]", "[render]\nseed = 3\n\n[camera]");
+    fs::write(bench.path("changed.toml"), changed).unwrap();
+    bench
+        .run("render changed.toml --backend cpu --spp 9 --film f.npz --size 8x8")
+        .code(2)
+        .stderr(says(
+            "leave out --size and add --seed 0, or name another film",
+        ));
+    bench
+        .run("render changed.toml --backend cpu --spp 9 --film f.npz --seed 0")
+        .success();
 }
 
 #[test]

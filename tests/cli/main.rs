@@ -9,6 +9,7 @@ mod bench;
 mod bits;
 mod files;
 mod info;
+mod kinds;
 mod said;
 mod selftest;
 mod status;

@@ -1,6 +1,6 @@
 //! Messages and help, on stdout and stderr.
 
-use crate::program::{Bench, says};
+use crate::program::{Bench, SCENE, says};
 use predicates::prelude::*;
 use std::fs;
 
@@ -60,6 +60,97 @@ fn every_command_has_examples_and_even_lines() {
                 .and(says("--threads")),
         );
     }
+}
+
+#[test]
+fn the_first_line_of_a_render_is_short() {
+    let bench = Bench::new();
+    let first = |flags: &str| {
+        let done = bench.run(&format!(
+            "render box.toml --backend cpu --threads 2 -o a.png {flags}"
+        ));
+        let said = String::from_utf8_lossy(&done.success().get_output().stderr).into_owned();
+        let line = said.lines().find(|l| !l.starts_with("note: "));
+        line.unwrap_or_default().to_owned()
+    };
+    let cpu = "on CPU reference (2 threads)";
+    for (flags, line) in [
+        ("--spp 4", format!("box: 24x16, 4 spp, {cpu}")),
+        (
+            "--error 50% --time 10m --size 12x8",
+            format!("box: 12x8, until error 50 % or 10 min, {cpu}"),
+        ),
+        (
+            "--spp 8 --region 0,0,4,4 --adaptive",
+            format!("box: 24x16 (16 pixels), 8 spp, adaptive, {cpu}"),
+        ),
+        (
+            "--samples 0..4 --film f.npz",
+            format!("box: 24x16, samples 0..4, {cpu}"),
+        ),
+        (
+            "--spp 9 --film f.npz",
+            format!("box: 24x16, 9 spp, {cpu}; f.npz holds 4 spp"),
+        ),
+    ] {
+        assert_eq!(first(flags), line);
+    }
+}
+
+#[test]
+fn quiet_is_quiet_everywhere() {
+    let bench = Bench::new();
+    bench.render("--spp 64 --film f.npz -o a.exr");
+    fs::create_dir(bench.path("scenes")).unwrap();
+    fs::copy(bench.path("box.toml"), bench.path("scenes/box.toml")).unwrap();
+    fs::write(bench.path("scenes/OTHER.TOML"), SCENE).unwrap();
+    for command in [
+        "render box.toml --backend cpu --spp 2 -o b.exr",
+        "render box.toml --spp 2 --size 4x4 -o b.exr",
+        "render box.toml --backend cpu --spp 64 --film f.npz -o b.exr",
+        "develop f.npz -o b.png",
+        "merge g.npz f.npz",
+        "compare a.exr a.exr --html c.html",
+        "make-scene spheres --count 3",
+        "selftest --backend cpu --filter incidence",
+        "regress scenes --bless --backend cpu --power 100%",
+        "regress scenes --backend cpu --junit -",
+        "bench box.toml --engine cpu --seeds 1 --max-spp 2 --reference-spp 16 --size 4x4 --cache c --json -",
+        "bench --report-table --engine cpu --size 4x3 --time 1ms",
+    ] {
+        for flag in ["-q", "--quiet"] {
+            let done = bench.run(&format!("{command} {flag}"));
+            let output = done.success().get_output().clone();
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(said.is_empty(), "{command}: {said}");
+            let _ = fs::remove_file(bench.path("g.npz"));
+        }
+    }
+}
+
+#[test]
+fn a_scene_in_place_of_a_command_suggests_render() {
+    let bench = Bench::new();
+    for scene in ["box.toml", "none.TOML"] {
+        bench
+            .run(&format!("{scene} --spp 4"))
+            .code(2)
+            .stdout("")
+            .stderr(says(&format!("to render a scene: etendue render {scene}")));
+    }
+    bench
+        .run("rendr")
+        .code(2)
+        .stderr(says("'render'").and(says("a scene:").not()));
+}
+
+#[test]
+fn help_says_that_the_first_stop_condition_ends_a_run() {
+    let bench = Bench::new();
+    bench
+        .run("render --help")
+        .success()
+        .stdout(says("When to stop (the first condition met ends the run):"));
 }
 
 #[test]
@@ -213,7 +304,7 @@ fn long_stages_are_shown_only_on_a_terminal() {
     let (stage, after) = bar.rsplit_once("reading bar.toml, ").expect(&bar);
     assert!(stage.contains("reading bar.toml, 0."), "{bar:?}");
     // Cleared before anything else is printed.
-    let (rest, said_next) = after.split_once("bar.toml: 24x16").expect(&bar);
+    let (rest, said_next) = after.split_once("bar: 24x16").expect(&bar);
     assert!(
         rest.contains("\x1b[2K") && said_next.contains("wrote"),
         "{bar:?}"

@@ -12,7 +12,7 @@ fn status_0_and_the_default_outputs() {
         .run("render box.toml --backend cpu --spp 1")
         .success()
         .stdout("")
-        .stderr(says("24x16").and(says("until 1 sample per pixel")))
+        .stderr(says("box: 24x16, 1 spp, on CPU reference ("))
         .stderr(says("wrote box.exr, box.png"));
     assert_eq!(bench.names(), ["box.exr", "box.png", "box.toml"]);
 }

@@ -37,11 +37,11 @@ fn damaged_films_are_refused_and_left_as_they_are() {
     let cases = [
         (edited(&|b| b.truncate(b.len() / 2)), "truncated"),
         (edited(&|b| b.truncate(b.len() - 1)), "truncated"),
-        (Vec::new(), "not a film: it is empty"),
+        (Vec::new(), "not a film (an empty file)"),
         (edited(&|b| b.push(0)), "extra bytes at the end"),
         (edited(&|b| b[20_000] ^= 4), "does not match its checksum"),
-        (png, "not a film: it is a PNG picture"),
-        (scene, "not a film: it is not a NumPy archive"),
+        (png, "not a film (a PNG picture)"),
+        (scene, "not a film (text, such as a scene file)"),
         (with_a_nan(&bench), "\"sums\" holds NaN"),
         (
             edited(&|b| negate_first_count(b, 4)),

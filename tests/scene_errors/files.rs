@@ -63,10 +63,19 @@ fn files_that_are_no_text() {
     );
     let nul = "found a NUL character; a scene file is TOML text";
     assert_eq!(message_about(b"title\0 = 1"), format!(":1:6: {nul}"));
-    let png = message_about(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
-    assert_eq!(png, format!(":1:1: byte 0x89 {utf8}"));
-    let zip = message_about(b"PK\x03\x04\x14\x00\x06");
-    assert_eq!(zip, format!(":1:6: {nul}"));
+    for (content, kind) in [
+        (&b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"[..], "a PNG picture"),
+        (b"\x76\x2f\x31\x01\x02\0\0\0", "an EXR picture"),
+        (b"PK\x03\x04\x14\x00\x06", "a ZIP archive, such as a film"),
+        (b"\xff\xd8\xff\xe0\0\x10JFIF", "a JPEG picture"),
+        (b"\x7fELF\0\xc3\x28", "binary data"),
+        (
+            b"version https://git-lfs.github.com/spec/v1\noid sha256:00\n",
+            "a git-lfs pointer; `git lfs pull` fetches the file itself",
+        ),
+    ] {
+        assert_eq!(message_about(content), format!(": not a scene ({kind})"));
+    }
     assert!(message_about(b"").starts_with(": is empty"));
 }
 

@@ -135,21 +135,53 @@ fn missing_keys_and_tables() {
 #[test]
 fn duplicates_and_syntax() {
     let once = "keys and [tables] must be unique; only [[tables]] can repeat";
-    one(
-        "vfov = 42",
-        "vfov = 42\nvfov = 43",
-        &format!("8:1: duplicate \"vfov\": {once}"),
-    );
-    one(
-        "[[plane]]",
-        "[render]\n[[plane]]",
-        &format!("38:2: duplicate \"render\": {once}"),
-    );
-    let material = errors("[material.steel]", "[material.white]");
-    assert_eq!(
-        material[0],
-        format!("s.toml:19:11: duplicate \"white\": {once}")
-    );
+    for (old, new, message) in [
+        (
+            "vfov = 42",
+            "vfov = 42\nvfov = 43",
+            "8:1: duplicate \"vfov\", first at line 7",
+        ),
+        (
+            "[[plane]]",
+            "[render]\n[[plane]]",
+            "38:2: duplicate [render], first at line 10",
+        ),
+        // The keys of a repeated table are no errors of their own.
+        (
+            "[[plane]]",
+            "[camera]\neye = [0, 0, 0]\nvfov = 1\n\n[[plane]]",
+            "38:2: duplicate [camera], first at line 3",
+        ),
+        (
+            "[material.steel]",
+            "[material.white]",
+            "19:11: duplicate [material.white], first at line 15",
+        ),
+        (
+            "[[disk]]",
+            "[ material . \"gloss\" ]\nexponent = 3\n\n[[disk]]",
+            "54:14: duplicate [material.gloss], first at line 26",
+        ),
+        (
+            "[[plane]]",
+            "[light]\nradius = 3\n\n[[plane]]",
+            "38:2: duplicate [light], first at line 32",
+        ),
+        (
+            "vfov = 42",
+            "vfov = {x = 1, x = 2}",
+            "7:16: duplicate \"x\", first at line 7",
+        ),
+    ] {
+        one(old, new, &format!("{message}: {once}"));
+    }
+    // What follows is read on.
+    let two = FULL
+        .replace("[[plane]]", "[camera]\nvfov = 1\n\n[[plane]]")
+        .replace("radius = 0.125", "radius = 0.125\nradius = 1");
+    let two = parse(&two).expect_err("two duplicates");
+    assert_eq!(two.len(), 2, "{two:?}");
+    assert!(two[1].starts_with("s.toml:66:1: duplicate \"radius\", first at line 65"));
     for (old, new, place) in [
         (
             "vfov = 42",
@@ -176,6 +208,52 @@ fn duplicates_and_syntax() {
     );
     let dotted = format!("[a{}]", ".a".repeat(100_000));
     assert!(!errors("[render]", &dotted).is_empty());
+}
+
+#[test]
+fn a_missing_comma_is_named() {
+    for (old, new, place) in [
+        (
+            "[0.0, 1.0, 3.8]",
+            "[0.0 1.0, 3.8]",
+            "4:12: not TOML: expected a comma before `1.0`",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "[0.0, 1.0 3.8]",
+            "4:17: not TOML: expected a comma before `3.8`",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "[1.0 0 0]",
+            "4:12: not TOML: expected a comma before `0`",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "[\n0.0,\n1.0\n3.8]",
+            "7:1: not TOML: expected a comma before `3.8`",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "[[0.0, 1.0] [3.8]]",
+            "4:19: not TOML: expected a comma before `[3.8`",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "{ a = 1 b = 2 }",
+            "4:15: not TOML: expected a comma before `b`",
+        ),
+        (
+            "title = \"Everything\"",
+            "title = [\"a\" \"b\"]",
+            "1:14: not TOML: expected a comma before `\"b\"`",
+        ),
+    ] {
+        one(old, new, place);
+    }
+    // No comma belongs there.
+    let unit = errors("vfov = 42", "vfov = 42 deg");
+    assert!(unit[0].contains("found `42 deg`"), "{unit:?}");
 }
 
 #[test]

@@ -12,6 +12,9 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Duration;
 
+/// Heading of the stop conditions.
+const STOP: &str = "When to stop (the first condition met ends the run)";
+
 /// `etendue render`.
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "\
@@ -58,18 +61,18 @@ pub struct RenderArgs {
 
     /// Total samples per pixel, including those already in the film
     /// [default: 256 if no other stop condition is given; on the CPU reference also --time 30s]
-    #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true, help_heading = STOP)]
     pub spp: Option<u64>,
     /// Rays per pixel-sample, as in the report: strata² x N samples per pixel
-    #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true, help_heading = STOP)]
     pub rays: Option<u64>,
     /// Stop after this rendering time (90s, 2m, 1h30m), but not before every pixel has a sample
-    #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, allow_hyphen_values = true, help_heading = STOP)]
     pub time: Option<Duration>,
     /// Stop when the relative error plus twice its uncertainty is at most E, such as 0.02 or 2%
-    #[arg(long, value_name = "E", value_parser = values::relative_error, allow_hyphen_values = true, help_heading = "When to stop")]
+    #[arg(long, value_name = "E", value_parser = values::relative_error, allow_hyphen_values = true, help_heading = STOP)]
     pub error: Option<f64>,
-    #[arg(long, value_name = "A..B", value_parser = values::sample_range, allow_hyphen_values = true, help_heading = "When to stop",
+    #[arg(long, value_name = "A..B", value_parser = values::sample_range, allow_hyphen_values = true, help_heading = STOP,
           conflicts_with_all = ["spp", "rays", "time", "error"],
           help = format!("Take only samples A to B-1, to split a picture across machines. Merged films equal a single run to \
                           1e-12 if A and B are multiples of {BLOCK}, else to 1e-6"))]

@@ -78,6 +78,10 @@ pub struct BenchArgs {
     /// Write the results as JSON lines. With - they go to stdout, and the tables go to stderr
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
+    /// Print all columns: MSE as claimed, relative and trimmed, FLIP, and full names of devices. Without it tables fit 100
+    /// characters
+    #[arg(long, conflicts_with_all = ["report_table", "scaling"], help_heading = "Output")]
+    pub wide: bool,
     /// Plot error against seconds (with --scaling: seconds per path against number), .svg or .png. Repeatable
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub plot: Vec<PathBuf>,

@@ -114,7 +114,7 @@ fn open(args: &BenchArgs) -> Result<Option<Arc<Gpu>>, Failure> {
         _ => return Ok(None),
     };
     let (gpu, note) = backend::open(wanted, args.adapter.as_deref())?;
-    if let Some(note) = note {
+    if let Some(note) = note.filter(|_| !args.talk.quiet) {
         say!("{note}");
     }
     Ok(gpu.map(Arc::new))
@@ -197,7 +197,7 @@ impl Bench<'_> {
                 progress.share(s.fraction, &format!("{name}: {engine}, {samples} samples"));
             },
         );
-        self.show(&table::text(&results))?;
+        self.show(&table::text(&results, self.args.wide))?;
         self.json += &record::lines(&results);
         panels.push(Panel::Error(ErrorPanel::new(&results)));
         match ended {

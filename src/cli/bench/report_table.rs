@@ -33,7 +33,7 @@ impl Bench<'_> {
             self.json += &record::line(&record::Record::ReportTable(cell));
         }
         let blank = figure9::blank(&cells);
-        if !blank.is_empty() {
+        if !blank.is_empty() && !self.args.talk.quiet {
             self.progress.say(&format!(
                 "note: blank cells would take longer than --time {} ({})",
                 clock(self.time().as_secs_f64()),

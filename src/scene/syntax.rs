@@ -1,0 +1,165 @@
+//! The syntax of scene files: TOML, with errors in the words of someone who writes a scene.
+
+use super::source::{Faults, Source, quoted, shorten};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Error};
+
+/// Texts up to this many bytes have all their syntax errors reported, longer ones the first: a
+/// large file of something else can have one error a byte.
+const MAX_RECOVERED_BYTES: usize = 1 << 16;
+
+/// The file as tables; none if it is not valid TOML.
+pub(super) fn tables<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeTable<'a>> {
+    let text = source.text();
+    if let Some(at) = text.find('\0') {
+        let message = "found a NUL character; a scene file is TOML text".into();
+        faults.push(Some(at), message);
+        return None;
+    }
+    let (root, mut errors) = if text.len() <= MAX_RECOVERED_BYTES {
+        DeTable::parse_recoverable(text)
+    } else {
+        match DeTable::parse(text) {
+            Ok(root) => (root, Vec::new()),
+            Err(error) => (Spanned::new(0..0, DeTable::new()), vec![error]),
+        }
+    };
+    let root = root.into_inner();
+    let span = |error: &Error| error.span().unwrap_or(0..0);
+    errors.sort_by_key(|error| span(error).start);
+    // Where the keys of a repeated table end, and the line of the last syntax error: one mistake is one error.
+    let (mut repeated, mut line) = (0, 0);
+    for error in &errors {
+        let span = span(error);
+        if error.message() == "duplicate key" {
+            if span.start >= repeated {
+                faults.push(Some(span.start), duplicate(source, &root, &span));
+                if header(text, &span).is_some() {
+                    repeated = end_of_table(text, span.end);
+                }
+            }
+            continue;
+        }
+        let this = source.table_place(span.start).line;
+        if this != line {
+            let (at, message) = syntax(source, error.message(), span);
+            faults.push(Some(at), message);
+        }
+        line = this;
+    }
+    errors.is_empty().then_some(root)
+}
+
+/// A syntax error: its place, and what is wrong.
+fn syntax(source: &Source, message: &str, span: Range<usize>) -> (usize, String) {
+    if let Some(at) = missing_comma(source.text(), message, &span) {
+        let rest = &source.text()[at..];
+        let value = |c: char| !c.is_whitespace() && !",]}=".contains(c);
+        let end = rest.find(|c| !value(c)).unwrap_or(rest.len());
+        let next = source.quote(at..at + end);
+        return (at, format!("not TOML: expected a comma before `{next}`"));
+    }
+    let found = source.quote(span.clone());
+    let message = match message {
+        // The parser treats anything that is not another value as a string.
+        _ if found.is_empty() && is_unquoted(message) => "not TOML: a value is missing".into(),
+        _ if found.is_empty() => format!("not TOML: {message}"),
+        _ => format!("not TOML: {message}; found `{found}`"),
+    };
+    (span.start, message)
+}
+
+fn is_unquoted(message: &str) -> bool {
+    message.starts_with("string values must be quoted")
+}
+
+/// Where the value stands that lacks a comma before it, if that is the error: the parser takes `1.0 0` for a single string.
+fn missing_comma(text: &str, message: &str, span: &Range<usize>) -> Option<usize> {
+    if message.starts_with("missing comma") {
+        return Some(span.start);
+    }
+    let found = text.get(span.clone()).filter(|_| is_unquoted(message))?;
+    let first = found.split_whitespace().next()?;
+    let is_value = first.parse::<f64>().is_ok() || ["true", "false"].contains(&first);
+    let next = found.len() - found.strip_prefix(first)?.trim_start().len();
+    let before = text[..span.start].trim_end();
+    let in_array = before.ends_with(['[', ',']);
+    let in_table = before.ends_with('=') && text[span.end..].trim_start().starts_with('=');
+    (is_value && next < found.len() && (in_array || in_table)).then_some(span.start + next)
+}
+
+/// The error about a key or table that is there already, with the line of the first one.
+fn duplicate(source: &Source, root: &DeTable, span: &Range<usize>) -> String {
+    let text = source.text();
+    let key = text.get(span.clone()).unwrap_or_default();
+    let earlier = || nearest(root, key.trim_matches(['"', '\'']), span.start);
+    let (what, first) = match header(text, span) {
+        Some(names) => {
+            let first = first_header(text, &names, span.start).or_else(earlier);
+            (format!("[{}]", shorten(&names.join("."))), first)
+        }
+        None => (quoted(&source.quote(span.clone())), earlier()),
+    };
+    let first = first.map_or_else(String::new, |at| {
+        format!(", first at line {}", source.table_place(at).line)
+    });
+    format!("duplicate {what}{first}: keys and [tables] must be unique; only [[tables]] can repeat")
+}
+
+/// The names in the header of a table, if the last one stands at `span`.
+fn header<'a>(text: &'a str, span: &Range<usize>) -> Option<Vec<&'a str>> {
+    let start = text[..span.start].rfind('\n').map_or(0, |at| at + 1);
+    names(text.get(start..span.end)?)
+}
+
+/// The names in a line that begins as a header does.
+fn names(line: &str) -> Option<Vec<&str>> {
+    let names = line.trim_start().strip_prefix('[')?;
+    let names = names.trim_start_matches('[').split(']').next()?;
+    let bare = names
+        .split('.')
+        .map(|name| name.trim().trim_matches(['"', '\'']));
+    Some(bare.collect())
+}
+
+/// The offset at which the next table begins.
+fn end_of_table(text: &str, from: usize) -> usize {
+    let mut lines = text[from..].split_inclusive('\n');
+    let mut at = from + lines.next().map_or(0, str::len);
+    for line in lines {
+        if line.trim_start().starts_with('[') {
+            break;
+        }
+        at += line.len();
+    }
+    at
+}
+
+/// Where the first header with these names stands before `end`.
+fn first_header(text: &str, wanted: &[&str], end: usize) -> Option<usize> {
+    let mut at = 0;
+    for line in text[..end].split_inclusive('\n') {
+        if names(line).is_some_and(|names| names == wanted) && at + line.len() < end {
+            return Some(at);
+        }
+        at += line.len();
+    }
+    None
+}
+
+/// Where the last key of this name before `end` stands. A key stands after its like with no other table between.
+fn nearest(table: &DeTable, name: &str, end: usize) -> Option<usize> {
+    let mut last = None;
+    for (key, value) in table {
+        let own = (key.get_ref() == name).then_some(key.span().start);
+        let tables = match value.get_ref() {
+            DeValue::Table(inner) => vec![inner],
+            DeValue::Array(all) => all.iter().filter_map(|v| v.get_ref().as_table()).collect(),
+            _ => Vec::new(),
+        };
+        let inner = tables.into_iter().filter_map(|t| nearest(t, name, end));
+        last = last.max(own.into_iter().chain(inner).filter(|at| *at < end).max());
+    }
+    last
+}
