@@ -18,6 +18,7 @@ mod render;
 mod saver;
 mod schema;
 mod selftest;
+mod shell;
 mod signals;
 mod stages;
 mod values;
@@ -63,6 +64,8 @@ pub fn main() -> ExitCode {
         Command::Bench(args) => bench::bench(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::man(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -10,5 +10,6 @@ mod bits;
 mod files;
 mod said;
 mod selftest;
+mod shell;
 mod status;
 mod stops;

@@ -29,7 +29,7 @@ fn help_and_version_are_data() {
 fn every_command_has_examples_and_even_lines() {
     let bench = Bench::new();
     for command in
-        "render check develop merge selftest compare regress make-scene bench adapters schema"
+        "render check develop merge selftest compare regress make-scene bench adapters schema completions man"
             .split(' ')
     {
         let done = bench.run(&format!("{command} --help")).success();
