@@ -39,7 +39,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     progress.finish();
     write_stdout(&comparison.report())?;
     if let Some(path) = &args.html {
-        let page = html::page(&a, &b, &comparison);
+        let page = html::page(&a, &b, html::LABELS, &comparison);
         atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
         if !args.talk.quiet {
             say!("wrote {}", path.display());
