@@ -163,15 +163,17 @@ fn the_page_has_failures_first_and_says_where_it_comes_from() {
     assert_eq!([caption("golden"), caption("now")], [2, 2]);
     assert!(place(">golden<") < place(">now<"));
     let version = env!("CARGO_PKG_VERSION");
-    place(&format!("etendue {version} on CPU reference (f64"));
+    place(&format!("etendue {version} on CPU reference (f64), "));
     let made = &page[place(&format!("etendue {version} on"))..];
-    let date = made.split_once("), ").expect("a date").1;
+    let date = made.split_once("; ").expect("a date").1;
     assert_eq!(&date[16..20], " UTC", "{}", &date[..20]);
     let report = std::fs::read_to_string(f.golden("two.report.html")).expect("written");
     for told in [
         "golden left of the line, now right of it",
         "alt=\"Picture golden\"",
         "<th scope=\"col\">now</th>",
+        "> Golden</label>",
+        "mean of golden",
     ] {
         assert!(report.contains(told), "no {told}");
     }

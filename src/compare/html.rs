@@ -31,9 +31,6 @@ const SEQUENTIAL: [[f64; 3]; 5] = [
     [0.99, 0.99, 0.75],
 ];
 
-/// What a page calls two pictures of equal rank.
-pub const LABELS: [&str; 2] = ["A", "B"];
-
 /// The page about a comparison of `a` and `b`, and what it calls them.
 pub fn page(a: &Picture, b: &Picture, labels: [&str; 2], comparison: &Comparison) -> String {
     let difference = format!("{} - {}", labels[1], labels[0]);
@@ -92,6 +89,8 @@ pub fn page(a: &Picture, b: &Picture, labels: [&str; 2], comparison: &Comparison
                 })
                 .into(),
         ),
+        ("choice_a", capital(labels[0])),
+        ("choice_b", capital(labels[1])),
         ("label_a", labels[0].into()),
         ("label_b", labels[1].into()),
         ("signed", difference),
@@ -118,7 +117,7 @@ pub fn page(a: &Picture, b: &Picture, labels: [&str; 2], comparison: &Comparison
         ("findings", findings(comparison, labels)),
         (
             "metrics",
-            rows(&text::metric_values(&comparison.metrics), "number"),
+            rows(&text::metric_values(&comparison.metrics, labels), "number"),
         ),
         ("histogram_title", histogram_title),
         ("histogram", histogram),
@@ -264,8 +263,8 @@ fn findings(comparison: &Comparison, labels: [&str; 2]) -> String {
     s + "</tbody></table></div>"
 }
 
-fn rows(values: &[(&str, String)], class: &str) -> String {
-    let row = |(key, value): &(&str, String)| {
+fn rows(values: &[(String, String)], class: &str) -> String {
+    let row = |(key, value): &(String, String)| {
         format!("<tr><th scope=\"row\">{key}</th><td class=\"{class}\">{value}</td></tr>")
     };
     values.iter().map(row).collect()

@@ -150,7 +150,7 @@ pub fn index(done: &[Done], filter: Option<Filter>, about: &About, base: &Path) 
     }
     let About { device, time } = about;
     let made = format!(
-        "etendue {} on {} ({}), {}",
+        "etendue {} on {}, {}; {}",
         env!("CARGO_PKG_VERSION"),
         device.name,
         device.driver,
