@@ -132,7 +132,7 @@ fn goldens_are_made_and_pass_with_another_seed() {
     assert!(page.contains("2 scenes: 2 passed") && !page.contains("{{"));
     f.run(&["--filter", "wo"])
         .code(0)
-        .stdout(contains("1 scene: 1 passed").and(contains("one").not()));
+        .stdout(contains("1 of 2 scenes (--filter wo): 1 passed").and(contains("one").not()));
     // Enough samples for --power, and not many more.
     let power = |flag: &str| {
         f.run(&["--bless", "--filter", "one", "--power", flag])
@@ -142,6 +142,83 @@ fn goldens_are_made_and_pass_with_another_seed() {
     };
     let (rough, fine) = (power("5%"), power("0.5%"));
     assert!(rough * 3 < fine, "{rough} and {fine} samples");
+}
+
+/// What comes first on a page is what needs to be looked at.
+#[test]
+fn the_page_has_failures_first_and_says_where_it_comes_from() {
+    let f = Folder::new(&["one", "two"]);
+    f.bless();
+    let (film, _) = render(&BALL.replace("20.0, 20.0", "30.0, 30.0"), 5, 64);
+    write_exr(&f.golden("two.exr"), &film, &render(BALL, 5, 64).1).expect("written");
+    f.run(&["--html", f.path("r.html").to_str().unwrap()])
+        .code(1);
+    let page = std::fs::read_to_string(f.path("r.html")).expect("written");
+    let place = |text: &str| {
+        page.find(text)
+            .unwrap_or_else(|| panic!("no {text}: {page}"))
+    };
+    assert!(place("two: failed") < place("one: passed"));
+    let caption = |label| page.matches(&format!("<figcaption>{label}<")).count();
+    assert_eq!([caption("golden"), caption("now")], [2, 2]);
+    assert!(place(">golden<") < place(">now<"));
+    let version = env!("CARGO_PKG_VERSION");
+    place(&format!("etendue {version} on CPU reference (f64), "));
+    let made = &page[place(&format!("etendue {version} on"))..];
+    let date = made.split_once("; ").expect("a date").1;
+    assert_eq!(&date[16..20], " UTC", "{}", &date[..20]);
+    let report = std::fs::read_to_string(f.golden("two.report.html")).expect("written");
+    for told in [
+        "golden left of the line, now right of it",
+        "alt=\"Picture golden\"",
+        "<th scope=\"col\">now</th>",
+        "> Golden</label>",
+        "mean of golden",
+    ] {
+        assert!(report.contains(told), "no {told}");
+    }
+    assert!(!report.contains("{{") && !report.contains("Picture A"));
+}
+
+/// Files that need not change do not, and a golden made anew is the same file.
+#[test]
+fn goldens_that_still_pass_are_left_alone() {
+    let f = Folder::new(&["one", "two"]);
+    f.bless();
+    let golden = |name: &str| std::fs::read(f.golden(name)).expect("a golden");
+    let (one, two) = (golden("one.exr"), golden("two.exr"));
+    assert_eq!(one, two, "one scene, one picture, one file");
+
+    // Another film of the scene, which passes, and one of another lamp, which does not.
+    let (film, provenance) = render(BALL, 7, 256);
+    write_exr(&f.golden("one.exr"), &film, &provenance).expect("written");
+    let kept = golden("one.exr");
+    let (film, _) = render(&BALL.replace("20.0, 20.0", "30.0, 30.0"), 5, 64);
+    write_exr(&f.golden("two.exr"), &film, &provenance).expect("written");
+    f.run(&["--bless", "--power", "5%"])
+        .code(0)
+        .stdout(contains(
+            "kept  one: the golden still passes: equal up to noise",
+        ))
+        .stdout(contains("blessed  two: 24x18"))
+        .stdout(contains("2 scenes: 1 blessed, 1 kept"));
+    assert_eq!(golden("one.exr"), kept);
+    assert_eq!(golden("two.exr"), two, "from scratch the same bytes");
+    assert!(!f.golden("two.report.html").exists());
+    f.run(&["--bless", "--filter", "two"])
+        .code(0)
+        .stdout(contains("1 of 2 scenes (--filter two): 1 kept"));
+
+    // One that is not as wanted is made anew.
+    for flags in [["--size", "12x9"], ["--max-spp", "16"]] {
+        f.run(&["--bless", flags[0], flags[1]])
+            .code(0)
+            .stdout(contains("2 scenes: 2 blessed"));
+    }
+    std::fs::write(f.golden("one.exr"), "no picture").expect("written");
+    f.run(&["--bless"])
+        .code(0)
+        .stdout(contains("blessed  one").and(contains("kept  two")));
 }
 
 #[test]

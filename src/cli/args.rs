@@ -70,6 +70,10 @@ Example:
   etendue schema > scene.schema.json
       gives a TOML editor completion and error checking")]
     Schema,
+    /// Print the completion script of a shell
+    Completions(CompletionsArgs),
+    /// Write the man pages
+    Man(ManArgs),
 }
 
 /// How much a long command prints.
@@ -168,6 +172,31 @@ pub struct CheckArgs {
     /// Scene files
     #[arg(required = true, value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
+}
+
+/// `etendue completions`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  etendue completions bash > ~/.local/share/bash-completion/completions/etendue
+  etendue completions zsh > ~/.zfunc/_etendue
+      for a ~/.zshrc with: fpath+=~/.zfunc; autoload -U compinit; compinit
+  etendue completions fish > ~/.config/fish/completions/etendue.fish")]
+pub struct CompletionsArgs {
+    /// The shell
+    pub shell: clap_complete::Shell,
+}
+
+/// `etendue man`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  etendue man ~/.local/share/man/man1
+      then: man etendue-render
+  etendue man | man -l -")]
+pub struct ManArgs {
+    /// Folder for etendue.1, etendue-render.1 and so on, made if it does not exist. Without it, etendue.1 goes to stdout
+    pub dir: Option<PathBuf>,
 }
 
 /// `etendue selftest`.

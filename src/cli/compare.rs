@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::files::Files;
 use super::progress::Progress;
 use super::{say, write_stdout};
-use crate::compare::{Limits, Picture, compare as compare_pictures, html};
+use crate::compare::{LABELS, Limits, Picture, compare as compare_pictures, html};
 use crate::files::atomic;
 use std::io::Write;
 use std::path::Path;
@@ -42,7 +42,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     progress.finish();
     write_stdout(&comparison.report())?;
     if let Some(path) = &args.html {
-        let page = html::page(&a, &b, &comparison);
+        let page = html::page(&a, &b, LABELS, &comparison);
         atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
         if !args.talk.quiet {
             say!("wrote {}", path.display());

@@ -19,6 +19,7 @@ mod render;
 mod saver;
 mod schema;
 mod selftest;
+mod shell;
 mod signals;
 mod stages;
 mod time_left;
@@ -68,6 +69,8 @@ pub fn main() -> ExitCode {
         Command::Bench(args) => bench::bench(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
+        Command::Completions(args) => shell::completions(&args),
+        Command::Man(args) => shell::man(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -7,10 +7,11 @@ use super::progress::Progress;
 use super::signals::Signals;
 use super::{plan, say, write_stdout};
 use crate::compare::Limits;
-use crate::engine::Engine;
+use crate::engine::{DeviceInfo, Engine};
 use crate::files::{FileError, atomic};
-use crate::regress::report::{self, Done};
-use crate::regress::{Case, Outcome, Trouble, Wanted, almost_scenes, bless, cases};
+use crate::reference::CpuEngine;
+use crate::regress::report::{self, About, Done, Filter};
+use crate::regress::{Case, Outcome, Trouble, Wanted, almost_scenes, cases};
 use crate::render::{Error, backend, memory};
 use crate::scene::parse;
 use crate::settings::Settings;
@@ -19,7 +20,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 /// Runs every case and lists the results. The exit status is 1 if one differs, 2 if one can't be compared.
 pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
@@ -27,7 +28,13 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     super::set_threads(args.talk.threads);
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
-    let cases = cases(&args.dir, args.filter.as_deref().unwrap_or(""))?;
+    let all = cases(&args.dir)?;
+    let filter = args.filter.as_deref().map(|text| Filter {
+        text,
+        of: all.len(),
+    });
+    let chosen = |case: &Case| filter.is_none_or(|f| case.name.contains(f.text));
+    let cases: Vec<Case> = all.into_iter().filter(chosen).collect();
     if !args.talk.quiet {
         for path in almost_scenes(&args.dir)? {
             let path = path.display();
@@ -44,18 +51,18 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     }
     check_files(args, &cases)?;
     // Without the selected adapter every case would fail.
-    if let (_, Some(note)) = backend::open(args.backend, args.adapter.as_deref())?
-        && !args.talk.quiet
-    {
+    let (gpu, note) = backend::open(args.backend, args.adapter.as_deref())?;
+    if let Some(note) = note.filter(|_| !args.talk.quiet) {
         say!("{note}");
     }
+    let device = gpu.map_or_else(CpuEngine::device_info, |gpu| gpu.info().clone());
     let mut done = run(args, &cases, &signals);
     done.sort_by(|a, b| a.case.name.cmp(&b.case.name));
     if signals.stop.load(Ordering::Relaxed) {
         let signal = signals.number();
         return Err(Failure::Interrupted { signal });
     }
-    finish(args, &done)
+    finish(args, &done, filter, device)
 }
 
 /// Refuses output files that would overwrite a scene, a golden, or each other.
@@ -129,18 +136,7 @@ fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
         ..Limits::default()
     };
     let (outcome, pictures) = if args.bless && case.scene {
-        let wanted = Wanted {
-            size: args.size,
-            power: args.power,
-            most_samples: args.max_spp,
-            alpha: args.alpha,
-        };
-        let outcome = match bless(case, &engine, &wanted, &signals.stop) {
-            Ok(Some(blessed)) => Outcome::Blessed(blessed),
-            Ok(None) => return None,
-            Err(trouble) => trouble.into(),
-        };
-        (outcome, None)
+        case.bless(&engine, &wanted(args), &limits, &signals.stop)?
     } else {
         case.run(&engine, &limits, &signals.stop)?
     };
@@ -152,7 +148,21 @@ fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
     })
 }
 
-fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
+fn wanted(args: &RegressArgs) -> Wanted {
+    Wanted {
+        size: args.size,
+        power: args.power,
+        most_samples: args.max_spp,
+        alpha: args.alpha,
+    }
+}
+
+fn finish(
+    args: &RegressArgs,
+    done: &[Done],
+    filter: Option<Filter>,
+    device: DeviceInfo,
+) -> Result<(), Failure> {
     let mut list = String::new();
     for d in done {
         let detail = d.outcome.detail(&d.case);
@@ -179,7 +189,7 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
             );
         }
     }
-    list += &format!("{}\n", report::summary(done));
+    list += &format!("{}\n", report::summary(done, filter));
     if args.junit.as_deref().is_some_and(is_stdout) {
         if !args.talk.quiet {
             say!("{}", list.trim_end());
@@ -189,7 +199,7 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
     }
     for d in done {
         if let Outcome::Blessed(golden) = &d.outcome
-            && let Some(warning) = golden.warning(args.power)
+            && let Some(warning) = golden.warning(&wanted(args))
         {
             say!("warning: {}: {warning}", d.case.name);
         }
@@ -199,7 +209,8 @@ fn finish(args: &RegressArgs, done: &[Done]) -> Result<(), Failure> {
     }
     if let Some(path) = &args.html {
         let base = path.parent().unwrap_or(Path::new(""));
-        let page = report::index(done, base);
+        let time = SystemTime::now();
+        let page = report::index(done, filter, &About { device, time }, base);
         atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
     }
     let any = |what: fn(&Outcome) -> bool| done.iter().any(|d| what(&d.outcome));

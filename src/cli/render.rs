@@ -123,11 +123,14 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         call: longest_call(args),
         adaptive: args.adaptive.then_some(settings.seed),
     };
+    if !args.talk.quiet
+        && let Some(note) = &chosen.note
+    {
+        say!("{note}");
+    }
+    say_suspect(args, &scene, &settings, chosen.engine.device());
     if !args.talk.quiet {
-        if let Some(note) = &chosen.note {
-            say!("{note}");
-        }
-        say_start(args, &scene, &settings, &chosen, &job, &film)?;
+        say_start(args, &settings, &chosen, &job, &film)?;
         say_other_adapters(args, &provenance, chosen.engine.device());
     }
 
@@ -304,21 +307,29 @@ fn check_same_samples(
     })
 }
 
+/// What is suspect about the scene: in full where it changes the picture, by number where it does not.
+fn say_suspect(args: &RenderArgs, scene: &Scene, settings: &Settings, device: &DeviceInfo) {
+    let on_gpu = (device.backend != "cpu").then_some(settings.size);
+    let lints = check::lints(scene, on_gpu);
+    for warning in &lints.picture {
+        say!("warning: {warning}");
+    }
+    let remarks = lints.remarks.len();
+    if remarks > 0 && !args.talk.quiet {
+        let s = if remarks == 1 { "" } else { "s" };
+        let scene = args.scene.display();
+        say!("note: {remarks} remark{s} about this scene; see: etendue check {scene}");
+    }
+}
+
 /// The start-up line: the scene, the device, and the stop conditions.
 fn say_start(
     args: &RenderArgs,
-    scene: &Scene,
     settings: &Settings,
     chosen: &Chosen,
     job: &Job,
     film: &Film,
 ) -> Result<(), Failure> {
-    let suspect = check::lint(scene).len();
-    if suspect > 0 {
-        let s = if suspect == 1 { "" } else { "s" };
-        let scene = args.scene.display();
-        say!("note: {suspect} warning{s} about this scene; see: etendue check {scene}");
-    }
     let [width, height] = settings.size;
     let pixels: u64 = job.tiles.iter().map(Rect::area).sum();
     let part = if args.region.is_empty() {

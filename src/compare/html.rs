@@ -31,8 +31,9 @@ const SEQUENTIAL: [[f64; 3]; 5] = [
     [0.99, 0.99, 0.75],
 ];
 
-/// The page about a comparison of `a` and `b`.
-pub fn page(a: &Picture, b: &Picture, comparison: &Comparison) -> String {
+/// The page about a comparison of `a` and `b`, and what it calls them.
+pub fn page(a: &Picture, b: &Picture, labels: [&str; 2], comparison: &Comparison) -> String {
+    let difference = format!("{} - {}", labels[1], labels[0]);
     let scores = comparison.verdict.as_ref().map(|_| scores(a, b));
     let differences: Vec<f64> = a
         .rgb
@@ -51,11 +52,11 @@ pub fn page(a: &Picture, b: &Picture, comparison: &Comparison) -> String {
     };
     let (histogram_title, histogram) = match &scores {
         Some(scores) => (
-            "Differences over their noise",
+            "Differences over their noise".to_owned(),
             histogram(&covered(scores, a), SCORE_RANGE, true),
         ),
         None => (
-            "Differences B - A",
+            format!("Differences {difference}"),
             histogram(&covered(&differences, a), range, false),
         ),
     };
@@ -88,6 +89,11 @@ pub fn page(a: &Picture, b: &Picture, comparison: &Comparison) -> String {
                 })
                 .into(),
         ),
+        ("choice_a", capital(labels[0])),
+        ("choice_b", capital(labels[1])),
+        ("label_a", labels[0].into()),
+        ("label_b", labels[1].into()),
+        ("signed", difference),
         ("a", picture_uri(a)),
         ("b", picture_uri(b)),
         ("width", a.size[0].to_string()),
@@ -108,12 +114,12 @@ pub fn page(a: &Picture, b: &Picture, comparison: &Comparison) -> String {
             "flip",
             uri(a.size, flip.map(|v| ramp(&SEQUENTIAL, f64::from(*v)))),
         ),
-        ("findings", findings(comparison)),
+        ("findings", findings(comparison, labels)),
         (
             "metrics",
-            rows(&text::metric_values(&comparison.metrics), "number"),
+            rows(&text::metric_values(&comparison.metrics, labels), "number"),
         ),
-        ("histogram_title", histogram_title.into()),
+        ("histogram_title", histogram_title),
         ("histogram", histogram),
         ("sensitivity", sensitivity(comparison)),
         ("origin", origin(a, b)),
@@ -227,7 +233,7 @@ fn boxes(comparison: &Comparison) -> String {
     s
 }
 
-fn findings(comparison: &Comparison) -> String {
+fn findings(comparison: &Comparison, labels: [&str; 2]) -> String {
     let Some(v) = comparison
         .verdict
         .as_ref()
@@ -235,10 +241,12 @@ fn findings(comparison: &Comparison) -> String {
     else {
         return String::new();
     };
-    let mut s = String::from(
+    let [label_a, label_b] = labels;
+    let mut s = format!(
         "<h2>Where they differ</h2><div class=\"scroll\"><table><thead><tr><th scope=\"col\">where</th>\
-         <th scope=\"col\">channel</th><th class=\"number\" scope=\"col\">A</th><th class=\"number\" scope=\"col\">B</th>\
-         <th class=\"number\" scope=\"col\">change</th><th class=\"number\" scope=\"col\">z</th></tr></thead><tbody>",
+         <th scope=\"col\">channel</th><th class=\"number\" scope=\"col\">{label_a}</th>\
+         <th class=\"number\" scope=\"col\">{label_b}</th><th class=\"number\" scope=\"col\">change</th>\
+         <th class=\"number\" scope=\"col\">z</th></tr></thead><tbody>"
     );
     for f in &v.findings {
         let [a, b] = f.means;
@@ -255,8 +263,8 @@ fn findings(comparison: &Comparison) -> String {
     s + "</tbody></table></div>"
 }
 
-fn rows(values: &[(&str, String)], class: &str) -> String {
-    let row = |(key, value): &(&str, String)| {
+fn rows(values: &[(String, String)], class: &str) -> String {
+    let row = |(key, value): &(String, String)| {
         format!("<tr><th scope=\"row\">{key}</th><td class=\"{class}\">{value}</td></tr>")
     };
     values.iter().map(row).collect()

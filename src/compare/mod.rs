@@ -18,6 +18,9 @@ pub use verdict::Verdict;
 /// The rate of false alarms over the whole picture, unless another is asked for.
 pub const DEFAULT_ALPHA: f64 = 0.001;
 
+/// What texts and pages call two pictures, unless one of them is a golden.
+pub(crate) const LABELS: [&str; 2] = ["A", "B"];
+
 /// What is asked of two pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {

@@ -1,7 +1,7 @@
 //! A comparison in words.
 
 use super::verdict::{Finding, Sensitivity, Verdict};
-use super::{Comparison, Metrics};
+use super::{Comparison, LABELS, Metrics};
 use std::fmt::Write as _;
 
 pub(super) const CHANNELS: [&str; 3] = ["red", "green", "blue"];
@@ -131,21 +131,21 @@ pub(super) fn change(a: f64, b: f64) -> String {
 }
 
 /// Names and values of the metrics.
-pub(super) fn metric_values(m: &Metrics) -> [(&'static str, String); 6] {
+pub(super) fn metric_values(m: &Metrics, labels: [&str; 2]) -> [(String, String); 6] {
     let rgb = |c: [f64; 3]| format!("{:.5} {:.5} {:.5}", c[0], c[1], c[2]);
     [
-        ("mean of A", rgb(m.means[0])),
-        ("mean of B", rgb(m.means[1])),
-        ("RMSE", format!("{:.5}", m.rmse)),
-        ("relative RMSE", percent(m.relative_rmse())),
-        ("PSNR", format!("{:.2} dB", m.psnr)),
-        ("mean FLIP", format!("{:.4}", m.flip)),
+        (format!("mean of {}", labels[0]), rgb(m.means[0])),
+        (format!("mean of {}", labels[1]), rgb(m.means[1])),
+        ("RMSE".into(), format!("{:.5}", m.rmse)),
+        ("relative RMSE".into(), percent(m.relative_rmse())),
+        ("PSNR".into(), format!("{:.2} dB", m.psnr)),
+        ("mean FLIP".into(), format!("{:.4}", m.flip)),
     ]
 }
 
 fn metrics(m: &Metrics) -> String {
     let line = |(key, value)| format!("  {key:<16} {value}\n");
-    metric_values(m).into_iter().map(line).collect()
+    metric_values(m, LABELS).into_iter().map(line).collect()
 }
 
 /// With three digits that count.

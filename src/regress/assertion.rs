@@ -1,9 +1,9 @@
 //! The verdict as an assertion, for tests.
 
+use super::golden;
 use crate::compare::{Limits, Picture, compare, html};
 use crate::files::atomic;
 use crate::film::Film;
-use crate::output::{ExrChannels, write_exr};
 use crate::provenance::Provenance;
 use std::io::Write;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::path::Path;
 /// The environment variable that makes [`assert_golden`] write its golden instead.
 pub const BLESS: &str = "ETENDUE_BLESS";
 
-/// Panics unless `film` equals the picture in `golden` up to the noise of both. The panic message says
+/// Panics unless `film` equals the picture at `path` up to the noise of both. The panic message says
 /// what differs, where and by how much, names the report (`NAME.report.html` beside the golden), and explains
 /// how to bless. If [`BLESS`] is set, writes the film as the golden instead.
 ///
@@ -42,19 +42,19 @@ pub const BLESS: &str = "ETENDUE_BLESS";
 /// # Ok::<(), etendue::Error>(())
 /// ```
 #[track_caller]
-pub fn assert_golden(golden: &Path, film: &Film, provenance: &Provenance) {
+pub fn assert_golden(path: &Path, film: &Film, provenance: &Provenance) {
     let mut provenance = provenance.clone();
     provenance.describe(film);
     if std::env::var_os(BLESS).is_some() {
-        if let Err(e) = write_exr(golden, film, &provenance, ExrChannels::All) {
+        if let Err(e) = golden::write(path, film, &provenance) {
             panic!("{e}");
         }
         return;
     }
-    if let Err(why) = check(golden, film, &provenance) {
+    if let Err(why) = check(path, film, &provenance) {
         panic!(
             "{why}\nif the change is intended, run the same test with {BLESS}=1 to re-create {}",
-            golden.display()
+            path.display()
         );
     }
 }
@@ -73,7 +73,7 @@ fn check(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), String
         return Ok(());
     }
     let report = path.with_extension("report.html");
-    let page = html::page(&golden, &actual, &comparison);
+    let page = html::page(&golden, &actual, super::LABELS, &comparison);
     let written = atomic::replace(&report, |f| f.write_all(page.as_bytes()));
     let place = match written {
         Ok(()) => format!("report: {}", report.display()),

@@ -2,6 +2,7 @@
 
 use super::{Case, MakeEngine, Trouble, render, text};
 use crate::compare::{Picture, verdict::verdict};
+use crate::files::FileError;
 use crate::film::Film;
 use crate::film::REPLICATES;
 use crate::film::coverage::Rect;
@@ -11,6 +12,7 @@ use crate::scene::{Scene, parse};
 use crate::settings::{Integrator, LightParts, Overrides, Settings};
 use crate::world::World;
 use std::fmt;
+use std::path::Path;
 use std::str::FromStr;
 use std::sync::atomic::AtomicBool;
 
@@ -20,17 +22,39 @@ const WIDTH: u32 = 64;
 /// Samples at which the noise is looked at first.
 const FIRST_LOOK: u64 = 64;
 
+/// The change of brightness that comparisons with goldens detect, unless another is asked for.
+const POWER: f64 = 0.01;
+
+/// Most samples per pixel of a golden, unless another number is asked for.
+const MOST_SAMPLES: u64 = 4096;
+
 /// How to make goldens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// Width and height; by default the scene's, scaled to 64 pixels wide.
     pub size: Option<[u32; 2]>,
-    /// The relative change of the whole picture's brightness that a comparison shall detect with 95 % probability.
-    pub power: f64,
-    /// Most samples per pixel.
-    pub most_samples: u64,
+    /// The relative change of the whole picture's brightness that a comparison shall detect with 95 % probability; by default 1 %.
+    pub power: Option<f64>,
+    /// Most samples per pixel; by default 4096.
+    pub most_samples: Option<u64>,
     /// The false-alarm rate of that comparison.
     pub alpha: f64,
+}
+
+impl Wanted {
+    fn power(&self) -> f64 {
+        self.power.unwrap_or(POWER)
+    }
+
+    /// Whether a golden is as asked for; without a wish it is.
+    pub(super) fn met_by(&self, golden: &Picture) -> bool {
+        let samples = golden.noise.as_ref().map_or(0, |n| n.samples[0]);
+        self.size.is_none_or(|size| size == golden.size)
+            && self.most_samples.is_none_or(|most| samples <= most)
+            && self
+                .power
+                .is_none_or(|power| smallest_change(golden, self.alpha) <= power)
+    }
 }
 
 /// The properties of a golden.
@@ -66,20 +90,20 @@ impl fmt::Display for Bless {
 
 impl Bless {
     /// A warning if comparisons detect only larger changes than `wanted`.
-    pub fn warning(&self, wanted: f64) -> Option<String> {
+    pub fn warning(&self, wanted: &Wanted) -> Option<String> {
         self.short.then(|| {
             format!(
                 "comparisons with this golden will detect a change of the whole picture's brightness by {:.2} % or more, but \
                  --power asks for {:.2} %; raise --max-spp",
                 100.0 * self.power,
-                100.0 * wanted
+                100.0 * wanted.power()
             )
         })
     }
 }
 
 /// Renders the case's scene with just enough samples, and writes it as the golden. `None` if `stop` was set.
-pub fn bless(
+pub(super) fn bless(
     case: &Case,
     engine: &MakeEngine,
     wanted: &Wanted,
@@ -103,7 +127,10 @@ pub fn bless(
     };
     let settings = Settings::resolve(&scene, &overrides);
     let mut provenance = Provenance::new(&scene, source, &settings);
-    let (step, most) = steps(settings.round(), wanted.most_samples)?;
+    let (step, most) = steps(
+        settings.round(),
+        wanted.most_samples.unwrap_or(MOST_SAMPLES),
+    )?;
     let (mut engine, tile) = engine(&World::new(&scene, size), &settings)?;
     let mut film = Film::new(size, Rect::whole(size), settings.strata);
     let whole_rounds = |n: f64| ((n as u64).div_ceil(step) * step).min(most);
@@ -121,11 +148,11 @@ pub fn bless(
         }
         let picture = Picture::from_film(path.display().to_string(), &film, &provenance)?;
         let power = smallest_change(&picture, wanted.alpha);
-        if power <= wanted.power || samples >= most {
+        if power <= wanted.power() || samples >= most {
             break power;
         }
         // Noise falls with the square root of the samples; a first look may be far off.
-        let factor = (1.05 * (power / wanted.power).powi(2)).clamp(1.1, 8.0);
+        let factor = (1.05 * (power / wanted.power()).powi(2)).clamp(1.1, 8.0);
         samples = whole_rounds(samples as f64 * factor);
     };
     if power >= NO_EVIDENCE && !provenance.black {
@@ -134,16 +161,25 @@ pub fn bless(
     let golden = case.golden_path();
     let folder = case.dir.join("golden");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    write_exr(&golden, &film, &provenance, ExrChannels::All).map_err(text)?;
+    write(&golden, &film, &provenance).map_err(text)?;
     case.clear();
     let bytes = std::fs::metadata(&golden).map_err(|e| format!("{}: {e}", golden.display()))?;
     Ok(Some(Bless {
         size,
         samples,
         power,
-        short: power > wanted.power,
+        short: power > wanted.power(),
         bytes: bytes.len(),
     }))
+}
+
+/// Writes a golden. The time that it took is left out, so that the same picture is the same file.
+pub(super) fn write(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), FileError> {
+    let untimed = Provenance {
+        seconds: 0.0,
+        ..provenance.clone()
+    };
+    write_exr(path, film, &untimed)
 }
 
 /// A golden is no evidence if comparisons with it do not detect a change of the whole picture's brightness by so much: it holds

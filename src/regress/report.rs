@@ -1,9 +1,11 @@
 //! The results of a regression run: as JUnit XML and as an HTML page.
 
-use super::{Case, Outcome};
+use super::{Case, LABELS, Outcome};
 use crate::compare::{Picture, html};
+use crate::engine::DeviceInfo;
 use std::fmt::Write as _;
-use std::time::Duration;
+use std::path::Path;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 const TEMPLATE: &str = include_str!("index.html");
 
@@ -20,8 +22,26 @@ pub struct Done {
     pub time: Duration,
 }
 
+/// The scenes that were left out.
+#[derive(Debug, Clone, Copy)]
+pub struct Filter<'a> {
+    /// `--filter`.
+    pub text: &'a str,
+    /// How many scenes there are without it.
+    pub of: usize,
+}
+
+/// What a page says about the run.
+#[derive(Debug, Clone)]
+pub struct About {
+    /// What rendered.
+    pub device: DeviceInfo,
+    /// When it ended.
+    pub time: SystemTime,
+}
+
 /// The last line of a list: how many of each.
-pub fn summary(done: &[Done]) -> String {
+pub fn summary(done: &[Done], filter: Option<Filter>) -> String {
     let words = [
         "passed",
         "FAILED",
@@ -30,6 +50,7 @@ pub fn summary(done: &[Done]) -> String {
         "unusable",
         "no device",
         "blessed",
+        "kept",
     ];
     let count = |word: &str| done.iter().filter(|d| d.outcome.word() == word).count();
     let told: Vec<String> = words
@@ -37,8 +58,14 @@ pub fn summary(done: &[Done]) -> String {
         .filter(|w| count(w) > 0)
         .map(|w| format!("{} {}", count(w), w.to_lowercase()))
         .collect();
-    let s = if done.len() == 1 { "" } else { "s" };
-    format!("{} scene{s}: {}", done.len(), told.join(", "))
+    let scenes = |n: usize| format!("{n} scene{}", if n == 1 { "" } else { "s" });
+    let which = match filter {
+        Some(Filter { text, of }) => {
+            format!("{} of {} (--filter {text})", done.len(), scenes(of))
+        }
+        None => scenes(done.len()),
+    };
+    format!("{which}: {}", told.join(", "))
 }
 
 /// JUnit XML: a failure for what differs or is new or orphaned, an error for what could not be compared.
@@ -91,15 +118,17 @@ fn xml_text(text: &str) -> String {
     html::escape(&text.chars().filter(legal).collect::<String>())
 }
 
-/// One page with all cases; it links the reports of failures by their paths from `base`, the page's folder.
-pub fn index(done: &[Done], base: &std::path::Path) -> String {
+/// One page with all cases, failures first; it links the reports of failures by their paths from `base`, the page's folder.
+pub fn index(done: &[Done], filter: Option<Filter>, about: &About, base: &Path) -> String {
+    let mut ordered: Vec<&Done> = done.iter().collect();
+    ordered.sort_by_key(|d| d.outcome.good());
     let mut rows = String::new();
-    for d in done {
+    for d in ordered {
         let class = if d.outcome.good() { "" } else { "different" };
-        let pictures = d.pictures.iter().flatten().map(|p| {
+        let name = html::escape(&d.case.name);
+        let pictures = d.pictures.iter().flatten().zip(LABELS).map(|(p, label)| {
             format!(
-                "<img alt=\"{}\" src=\"{}\">",
-                html::escape(&p.name),
+                "<figure><img alt=\"{name}, {label}\" src=\"{}\"><figcaption>{label}</figcaption></figure>",
                 html::picture_uri(p)
             )
         });
@@ -113,12 +142,74 @@ pub fn index(done: &[Done], base: &std::path::Path) -> String {
             _ => String::new(),
         };
         rows += &format!(
-            "<section class=\"verdict {class}\"><h2>{}: {}</h2><p>{}{report}</p><div class=\"pictures\">{}</div></section>",
-            html::escape(&d.case.name),
+            "<section class=\"verdict {class}\"><h2>{name}: {}</h2><p>{}{report}</p><div class=\"pictures\">{}</div></section>",
             d.outcome.word().to_lowercase(),
             html::escape(&d.outcome.detail(&d.case)),
             pictures.collect::<String>()
         );
     }
-    html::fill(TEMPLATE, &[("summary", summary(done)), ("rows", rows)])
+    let About { device, time } = about;
+    let made = format!(
+        "etendue {} on {}, {}; {}",
+        env!("CARGO_PKG_VERSION"),
+        device.name,
+        device.driver,
+        utc(*time)
+    );
+    let values = [
+        ("summary", html::escape(&summary(done, filter))),
+        ("made", html::escape(&made)),
+        ("rows", rows),
+    ];
+    html::fill(TEMPLATE, &values)
+}
+
+/// A time to the minute: "2026-02-28 23:59 UTC".
+fn utc(time: SystemTime) -> String {
+    let seconds = time
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default()
+        .as_secs();
+    let (days, minutes) = (seconds / 86_400, seconds % 86_400 / 60);
+    // The Gregorian calendar repeats every 400 years of 146097 days. Its years here start in March, so that a leap day is a year's
+    // last, and the first day is 1 March of the year 0.
+    let days = days + 719_468;
+    let (era, day) = (days / 146_097, days % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    // March to July have 153 days, and so have the next five months.
+    let month = (5 * day + 2) / 153;
+    let day = day - (153 * month + 2) / 5 + 1;
+    let (year, month) = if month < 10 {
+        (year, month + 3)
+    } else {
+        (year + 1, month - 9)
+    };
+    let year = 400 * era + year;
+    format!(
+        "{year}-{month:02}-{day:02} {:02}:{:02} UTC",
+        minutes / 60,
+        minutes % 60
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Dates from `date -u -d @SECONDS`.
+    #[test]
+    fn times_are_in_the_gregorian_calendar() {
+        for (seconds, text) in [
+            (0, "1970-01-01 00:00 UTC"),
+            (951_782_399, "2000-02-28 23:59 UTC"),
+            (951_782_400, "2000-02-29 00:00 UTC"),
+            (951_868_800, "2000-03-01 00:00 UTC"),
+            (1_735_689_599, "2024-12-31 23:59 UTC"),
+            (1_772_323_199, "2026-02-28 23:59 UTC"),
+            (4_107_542_400, "2100-03-01 00:00 UTC"),
+        ] {
+            assert_eq!(utc(UNIX_EPOCH + Duration::from_secs(seconds)), text);
+        }
+    }
 }

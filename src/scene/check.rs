@@ -3,6 +3,7 @@
 mod coincide;
 mod cross;
 mod eye;
+mod far;
 mod geometry;
 mod lights;
 mod open;
@@ -37,17 +38,39 @@ impl Warnings {
     }
 }
 
-/// Warnings about what is valid but suspect, in no order of severity. Most scenes have none.
+/// Warnings about what is valid but suspect. Most scenes have none.
 ///
 /// There are none for a closed room of opaque walls, with things that stand on its floor and lamps flush on its ceiling.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Lints {
+    /// What makes the picture differ from what the scene seems to say.
+    pub picture: Vec<Diagnostic>,
+    /// Remarks about a picture that is as the scene says.
+    pub remarks: Vec<Diagnostic>,
+}
+
+/// All warnings about a picture of the scene's own resolution, those that concern the picture first.
 pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
-    let mut kinds = vec![materials(scene)];
+    let Lints { picture, remarks } = lints(scene, Some(scene.camera.resolution));
+    picture.into_iter().chain(remarks).collect()
+}
+
+/// The warnings about a picture of this size from a GPU; or from the reference, which has f64, without a size.
+pub fn lints(scene: &Scene, on_gpu: Option<[u32; 2]>) -> Lints {
+    let mut picture = vec![eye::warnings(scene)];
+    picture.extend(on_gpu.map(|size| far::warnings(scene, size)));
+    let mut remarks = vec![
+        materials(scene),
+        lights::black(scene),
+        open::warnings(scene),
+    ];
     let things = scene.primitives.len() + scene.lights.len();
     if things <= MAX_PAIRWISE {
-        kinds.push(coincide::warnings(scene));
-        kinds.push(cross::warnings(scene));
-        kinds.push(lights::covered(scene));
-        kinds.push(lights::unseen(scene));
+        picture.push(coincide::warnings(scene));
+        picture.push(cross::warnings(scene));
+        picture.push(lights::covered(scene));
+        picture.push(lights::unseen(scene));
+        picture.push(lights::turned_away(scene));
     } else {
         let mut skipped = Warnings::default();
         skipped.add(Place::default(), || {
@@ -56,12 +79,15 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
                  searched for surfaces that coincide or cross, or hide a light"
             )
         });
-        kinds.push(skipped);
+        remarks.push(skipped);
     }
-    kinds.push(lights::black(scene));
-    kinds.push(eye::warnings(scene));
-    kinds.push(open::warnings(scene));
+    Lints {
+        picture: diagnostics(scene, picture),
+        remarks: diagnostics(scene, remarks),
+    }
+}
 
+fn diagnostics(scene: &Scene, kinds: Vec<Warnings>) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for Warnings { first, more } in kinds {
         let counted = format!("{more} more warnings of this kind");
@@ -188,6 +214,22 @@ radiance = [9, 9, 9]
                [[cylinder]]\nbase = [-1,0,0]\ntop = [-1,1,0]\nradius = 0.3\nmaterial = 'glass'\n\
                [[disk]]\ncenter = [0,1,-3]\nnormal = [0,0,1]\nradius = 0.5\nmaterial = 'red'\n";
         assert_eq!(lint(&scene(&text)), []);
+    }
+
+    #[test]
+    fn what_changes_the_picture_is_told_from_remarks() {
+        let ball = "[[sphere]]\ncenter = [0,0,0]\nradius = 1\nmaterial = 'red'\n";
+        let Lints { picture, remarks } = lints(&scene(&ball.repeat(2)), None);
+        let said = |list: &[Diagnostic]| -> Vec<String> {
+            list.iter().map(|w| w.message.clone()).collect()
+        };
+        let [picture, remarks] = [said(&picture), said(&remarks)];
+        assert!(
+            matches!(&picture[..], [one] if one.contains("coincides with")),
+            "{picture:?}"
+        );
+        // Two materials are not used, and there are no walls.
+        assert_eq!(remarks.len(), 3, "{remarks:?}");
     }
 
     #[test]

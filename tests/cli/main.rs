@@ -12,5 +12,6 @@ mod info;
 mod kinds;
 mod said;
 mod selftest;
+mod shell;
 mod status;
 mod stops;

@@ -29,7 +29,7 @@ fn help_and_version_are_data() {
 fn every_command_has_examples_and_even_lines() {
     let bench = Bench::new();
     for command in
-        "render check develop merge selftest compare regress make-scene bench adapters schema"
+        "render check develop merge selftest compare regress make-scene bench adapters schema completions man"
             .split(' ')
     {
         let done = bench.run(&format!("{command} --help")).success();
@@ -348,15 +348,68 @@ fn turned_away(radiance: f64) -> String {
     )
 }
 
+/// The same with a chip close before the lamp, whose light goes nowhere else.
+fn shaded(radiance: f64) -> String {
+    turned_away(radiance)
+        + "[[disk]]\ncenter = [0, 3.05, 0]\nnormal = [0, 1, 0]\nradius = 0.05\nmaterial = \"white\"\n"
+}
+
 #[test]
 fn check_names_lights_that_have_lit_nothing() {
     let bench = Bench::new();
     let other =
         "[[light]]\ncenter = [0, 3, 1]\nnormal = [0, -1, 0]\nradius = 0.2\nradiance = [5, 5, 5]\n";
-    fs::write(bench.path("idle.toml"), turned_away(5.0) + other).unwrap();
+    fs::write(bench.path("idle.toml"), shaded(5.0) + other).unwrap();
     bench.run("check idle.toml").success().stderr(
-        says("idle.toml:6:1: the light at line 6 has lit nothing").and(says("line 11").not()),
+        says("idle.toml:6:1: the light at line 6 has lit nothing").and(says("line 16").not()),
     );
+}
+
+/// What changes the picture is told in full, however quiet the run; the rest is counted.
+#[test]
+fn render_repeats_warnings_that_change_the_picture() {
+    let bench = Bench::new();
+    fs::write(bench.path("dark.toml"), turned_away(5.0)).unwrap();
+    let run = |flags: &str| {
+        let done = bench
+            .run(&format!(
+                "render dark.toml --backend cpu --spp 4 -o a.png {flags}"
+            ))
+            .success();
+        String::from_utf8_lossy(&done.get_output().stderr).into_owned()
+    };
+    let warning = "warning: dark.toml:6:1: the light at line 6 faces away from everything";
+    let said = run("");
+    assert!(said.contains(warning), "{said}");
+    let note = "note: 1 remark about this scene; see: etendue check dark.toml";
+    assert!(said.contains(note), "{said}");
+    let quiet = run("--quiet");
+    assert!(
+        quiet.starts_with(warning) && quiet.lines().count() == 1,
+        "{quiet}"
+    );
+    bench.run("check dark.toml").success().stderr(
+        says(warning)
+            .and(says("warning: dark.toml: the scene is open"))
+            .and(says("lit nothing").not()),
+    );
+}
+
+/// A pixel of so narrow a view is narrower than the rays of a GPU are apart. The reference has no such limit.
+#[test]
+fn views_that_are_too_narrow_for_a_gpu() {
+    let bench = Bench::new();
+    let narrow = crate::program::SCENE.replace("45.0", "1e-6");
+    fs::write(bench.path("narrow.toml"), narrow).unwrap();
+    let told = says("1.1e-9 of its distance wide");
+    bench
+        .run("check narrow.toml")
+        .success()
+        .stderr(told.clone());
+    bench
+        .run("render narrow.toml --backend cpu --spp 1 -o a.png --quiet")
+        .success()
+        .stderr(told.not());
 }
 
 /// Nothing found is nothing known, unless no lamp shines.

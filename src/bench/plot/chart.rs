@@ -1,16 +1,18 @@
 //! The parts common to all panels: log axes, curves, dashed lines, a legend.
 
 use super::Drawn;
-use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
+use plotters::chart::{ChartBuilder, ChartContext};
 use plotters::coord::Shift;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::combinators::{BindKeyPoints, LogCoord, WithKeyPoints};
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind};
-use plotters::element::{Circle, Cross, PathElement, TriangleMarker};
+use plotters::element::{
+    Circle, Cross, DashedPathElement, DynElement, IntoDynElement, PathElement, Text, TriangleMarker,
+};
 use plotters::prelude::{Color, DrawingBackend, IntoLogRange, RGBColor, ShapeStyle};
 use plotters::series::{DashedLineSeries, LineSeries};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{BLACK, FontDesc, IntoFont, TextStyle, WHITE};
+use plotters::style::{BLACK, FontDesc, IntoFont, TextStyle};
 
 /// Told apart by colour-blind eyes too [Okabe and Ito, 2008].
 const COLOURS: [RGBColor; 6] = [
@@ -101,79 +103,122 @@ impl Pen {
         Ok(chart)
     }
 
-    /// A grey line of dashes, so long and so far apart; `slant` is its direction in the legend.
-    pub fn dashes<'a, DB: DrawingBackend + 'a>(
+    /// A grey line of dashes.
+    pub fn dashes<DB: DrawingBackend>(
         self,
-        chart: &mut Chart<'a, DB>,
+        chart: &mut Chart<DB>,
         ends: [(f64, f64); 2],
-        [dash, gap]: [f64; 2],
-        slant: [f64; 2],
-        label: &str,
+        dashes: Dashes,
     ) -> Drawn<DB> {
-        let style = self.line(GREY, 1.2);
-        let series = DashedLineSeries::new(ends, self.px(dash) as u32, self.px(gap) as u32, style);
-        let [across, down] = slant.map(|s| (s * self.px(8.0)) as i32);
-        chart
-            .draw_series(series)?
-            .label(label)
-            .legend(move |(x, y)| {
-                PathElement::new([(x - across, y - down), (x + across, y + down)], style)
-            });
+        let [dash, gap] = self.lengths(dashes);
+        let series = DashedLineSeries::new(ends, dash, gap, self.line(GREY, 1.2));
+        chart.draw_series(series)?;
         Ok(())
+    }
+
+    fn lengths(self, dashes: Dashes) -> [u32; 2] {
+        dashes.0.map(|length| self.px(length) as u32)
     }
 
     /// Curve `i`, with a mark at each point.
-    pub fn curve<'a, DB: DrawingBackend + 'a>(
+    pub fn curve<DB: DrawingBackend>(
         self,
-        chart: &mut Chart<'a, DB>,
+        chart: &mut Chart<DB>,
         i: usize,
-        name: &str,
         points: &[(f64, f64)],
     ) -> Drawn<DB> {
-        let style = self.line(Self::colour(i), 1.8);
-        let half = self.px(4.5) as i32;
-        let points = || points.iter().copied();
-        // Marks are types of their own, for points of the chart and of the legend.
-        macro_rules! curve {
-            ($mark:ident, $style:expr) => {{
-                let mark = $style;
-                chart
-                    .draw_series(LineSeries::new(points(), style))?
-                    .label(name)
-                    .legend(move |at| $mark::new(at, half, mark));
-                chart.draw_series(points().map(|at| $mark::new(at, half, mark)))?;
-            }};
-        }
-        match i % 4 {
-            0 => curve!(Circle, style),
-            1 => curve!(TriangleMarker, style),
-            2 => curve!(Cross, style),
-            _ => curve!(
-                Circle,
-                ShapeStyle {
-                    filled: false,
-                    ..style
-                }
-            ),
-        }
+        let line = LineSeries::new(points.iter().copied(), self.line(Self::colour(i), 1.8));
+        chart.draw_series(line)?;
+        chart.draw_series(points.iter().map(|&at| self.mark(i, at)))?;
         Ok(())
     }
 
-    /// The names of all curves and lines.
-    pub fn legend<'a, DB: DrawingBackend + 'a>(
+    /// The mark of curve `i`, at a point of a chart or of a legend.
+    fn mark<C: Clone + 'static, DB: DrawingBackend>(
         self,
-        chart: &mut Chart<'a, DB>,
-        position: SeriesLabelPosition,
-    ) -> Drawn<DB> {
-        chart
-            .configure_series_labels()
-            .position(position)
-            .margin(self.px(8.0) as i32)
-            .legend_area_size(self.px(18.0) as u32)
-            .label_font(TextStyle::from(self.font(14.0)).pos(Pos::new(HPos::Left, VPos::Top)))
-            .background_style(WHITE.mix(0.85))
-            .draw()
+        i: usize,
+        at: C,
+    ) -> DynElement<'static, DB, C> {
+        let style = self.line(Self::colour(i), 1.8);
+        let half = self.px(4.5) as i32;
+        match i % 4 {
+            0 => Circle::new(at, half, style).into_dyn(),
+            1 => TriangleMarker::new(at, half, style).into_dyn(),
+            2 => Cross::new(at, half, style).into_dyn(),
+            _ => {
+                let hollow = ShapeStyle {
+                    filled: false,
+                    ..style
+                };
+                Circle::new(at, half, hollow).into_dyn()
+            }
+        }
     }
+
+    /// Draws the legend at the foot of a panel, and returns what is left above it: there the legend covers no line.
+    pub fn legend<DB: DrawingBackend>(
+        self,
+        area: &DrawingArea<DB, Shift>,
+        entries: &[(Sample, String)],
+    ) -> Result<DrawingArea<DB, Shift>, DrawingAreaErrorKind<DB::ErrorType>> {
+        let [row, sample, gap, margin] = [22.0, 34.0, 8.0, 14.0].map(|units| self.px(units) as i32);
+        let text = TextStyle::from(self.font(14.0)).pos(Pos::new(HPos::Left, VPos::Center));
+        let (width, height) = area.dim_in_pixel();
+
+        // As many entries in a row as it takes.
+        let mut places = Vec::new();
+        let (mut x, mut rows) = (margin, 1);
+        for (_, name) in entries {
+            let long = sample + gap + area.estimate_text_size(name, &text)?.0 as i32;
+            if x > margin && x + long + margin > width as i32 {
+                (x, rows) = (margin, rows + 1);
+            }
+            places.push((x, rows));
+            x += long + 2 * gap;
+        }
+        let foot = rows * row + gap;
+        let (above, below) = area.split_vertically(height as i32 - foot);
+        for ((kind, name), (x, rows)) in entries.iter().zip(places) {
+            let y = rows * row - row / 2;
+            let ends = [(x, y), (x + sample, y)];
+            match *kind {
+                Sample::Dashes(dashes) => {
+                    let [dash, gap] = self.lengths(dashes);
+                    let style = self.line(GREY, 1.2);
+                    below.draw(&DashedPathElement::new(ends, dash, gap, style))?;
+                }
+                Sample::Curve(i) => {
+                    let style = self.line(Self::colour(i), 1.8);
+                    below.draw(&PathElement::new(ends, style))?;
+                    below.draw(&self.mark(i, (x + sample / 2, y)))?;
+                }
+            }
+            below.draw(&Text::new(
+                name.as_str(),
+                (x + sample + gap, y),
+                text.clone(),
+            ))?;
+        }
+        Ok(above)
+    }
+}
+
+/// How long the dashes of a line are, and how far apart.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Dashes(pub [f64; 2]);
+
+impl Dashes {
+    pub const LONG: Self = Self([6.0, 4.0]);
+    pub const SHORT: Self = Self([2.0, 3.0]);
+}
+
+/// How a legend shows a line.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Sample {
+    /// With its dashes.
+    Dashes(Dashes),
+    /// As curve `i`, with its mark.
+    Curve(usize),
 }
 
 /// Least and greatest of some values, widened to leave room; 1 around nothing.

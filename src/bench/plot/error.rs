@@ -1,10 +1,9 @@
 //! Error against seconds, a panel for each scene.
 
 use super::Drawn;
-use super::chart::{Axes, Pen, plain, range};
+use super::chart::{Axes, Dashes, Pen, Sample, plain, range};
 use crate::bench::summary::Point;
 use crate::bench::{EngineKind, Results};
-use plotters::chart::SeriesLabelPosition;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::PathElement;
@@ -69,25 +68,6 @@ impl ErrorPanel {
 }
 
 impl ErrorPanel {
-    /// Where the legend hides fewer points: errors fall to the right, so two corners are mostly free.
-    fn free_corner(&self) -> SeriesLabelPosition {
-        let [x, y] = self.ranges();
-        let share = |v: f64, [a, b]: [f64; 2]| (v / a).ln() / (b / a).ln();
-        let (mut left, mut right) = (0, 0);
-        for p in self.curves.iter().flat_map(|c| &c.points) {
-            let (x, y) = (share(p[0], x), share(p[1], y));
-            left += u32::from(x < 0.4 && y < 0.4);
-            right += u32::from(x > 0.6 && y > 0.6);
-        }
-        if right < left {
-            SeriesLabelPosition::UpperRight
-        } else {
-            SeriesLabelPosition::LowerLeft
-        }
-    }
-}
-
-impl ErrorPanel {
     /// Draws it.
     pub(super) fn draw<DB: DrawingBackend>(
         &self,
@@ -96,8 +76,21 @@ impl ErrorPanel {
     ) -> Drawn<DB> {
         let [x, y] = self.ranges();
         let [[x0, x1], [y0, y1]] = [x, y];
+        // The guide lies below the end of the first curve, where costs besides the samples matter least.
+        let last = self.curves.iter().find_map(|c| c.points.last());
+        let guide = last.map(|_| (Sample::Dashes(Dashes::LONG), "slope -1/2".to_owned()));
+        let floor = self.floor.map(|_| {
+            (
+                Sample::Dashes(Dashes::SHORT),
+                "noise of the reference".to_owned(),
+            )
+        });
+        let curves = self.curves.iter().enumerate();
+        let curves = curves.map(|(i, c)| (Sample::Curve(i), c.engine.name().to_owned()));
+        let legend: Vec<_> = curves.chain(guide).chain(floor).collect();
+        let area = pen.legend(area, &legend)?;
         let mut chart = pen.axes(
-            area,
+            &area,
             &Axes {
                 title: &self.title,
                 names: ["seconds", "relative error"],
@@ -105,25 +98,16 @@ impl ErrorPanel {
                 y_label: |y| format!("{} %", plain(y * 100.0)),
             },
         )?;
-        // The guide lies below the end of the first curve, where costs besides the samples matter least.
-        let last = self.curves.iter().find_map(|c| c.points.last());
         if let Some([x, y, _]) = last {
             let low = 0.7 * y;
             let guide = |t: f64| (t, low * (t / x).powf(-0.5));
             // The library does not clip lines outside the chart, but bends them along its edge.
             let at = |error: f64| x * (low / error).powi(2);
             let ends = [x0.max(at(y1)), x1.min(at(y0))].map(guide);
-            pen.dashes(&mut chart, ends, [6.0, 4.0], [1.0, 0.5], "slope -1/2")?;
+            pen.dashes(&mut chart, ends, Dashes::LONG)?;
         }
         if let Some(floor) = self.floor {
-            let ends = [(x0, floor), (x1, floor)];
-            pen.dashes(
-                &mut chart,
-                ends,
-                [2.0, 3.0],
-                [1.0, 0.0],
-                "noise of the reference",
-            )?;
+            pen.dashes(&mut chart, [(x0, floor), (x1, floor)], Dashes::SHORT)?;
         }
         for (i, curve) in self.curves.iter().enumerate() {
             let thin = pen.line(Pen::colour(i), 1.2);
@@ -131,9 +115,9 @@ impl ErrorPanel {
                 PathElement::new([(x, (y - sd).max(0.5 * y)), (x, y + sd)], thin)
             }))?;
             let points: Vec<(f64, f64)> = curve.points.iter().map(|p| (p[0], p[1])).collect();
-            pen.curve(&mut chart, i, curve.engine.name(), &points)?;
+            pen.curve(&mut chart, i, &points)?;
         }
-        pen.legend(&mut chart, self.free_corner())
+        Ok(())
     }
 }
 
@@ -215,16 +199,49 @@ mod tests {
         assert!(svg(&[]).is_ok());
     }
 
+    /// The samples of the legend are below all that the chart draws, and dashed lines have dashes there.
     #[test]
-    fn the_legend_hides_few_points() {
-        let corner = |middle: [f64; 3]| {
-            let mut p = panel(None);
-            p.curves.truncate(1);
-            p.curves[0].points = vec![[0.1, 1.0, 0.0], middle, [1.0, 0.1, 0.0]];
-            p.free_corner()
+    fn the_legend_is_below_the_chart_and_shows_dashes() {
+        let text = String::from_utf8(svg(&[Panel::Error(panel(Some(0.02)))]).unwrap()).unwrap();
+        let number = |element: &str, name: &str| -> f64 {
+            let from = element
+                .split_once(&format!(" {name}=\""))
+                .expect("a number")
+                .1;
+            from.split('"').next().unwrap().parse().unwrap()
         };
-        let [fast, slow] = [[0.12, 0.11, 0.0], [0.9, 0.9, 0.0]].map(corner);
-        assert!(matches!(fast, SeriesLabelPosition::UpperRight));
-        assert!(matches!(slow, SeriesLabelPosition::LowerLeft));
+        // A text stands in the line after its element.
+        let lines: Vec<&str> = text.lines().collect();
+        let place = |name: &str| {
+            let at = lines.iter().position(|l| l.trim() == name);
+            number(lines[at.unwrap_or_else(|| panic!("no {name}")) - 1], "y")
+        };
+        let axis = place("seconds");
+        for name in [
+            "gpu-baked",
+            "cpu-brute",
+            "slope -1/2",
+            "noise of the reference",
+        ] {
+            assert!(place(name) > axis, "{name} is in the chart");
+        }
+        let dashes = |width: std::ops::Range<f64>| {
+            let short = |l: &&&str| {
+                let ends = l
+                    .split_once("points=\"")
+                    .map(|(_, p)| p.split('"').next().unwrap());
+                let all: Vec<f64> = ends
+                    .into_iter()
+                    .flat_map(|p| p.split([' ', ',']).filter_map(|n| n.parse().ok()))
+                    .collect();
+                matches!(all[..], [x0, y0, x1, y1] if y0 == y1 && y0 > axis && width.contains(&(x1 - x0)))
+            };
+            lines
+                .iter()
+                .filter(|l| l.starts_with("<polyline"))
+                .filter(short)
+                .count()
+        };
+        assert!(dashes(4.0..7.0) >= 2 && dashes(0.5..3.0) >= 4, "{text}");
     }
 }

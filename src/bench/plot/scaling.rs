@@ -1,9 +1,8 @@
 //! Seconds per path against the number of objects.
 
 use super::Drawn;
-use super::chart::{Axes, Pen, plain, range};
+use super::chart::{Axes, Dashes, Pen, Sample, plain, range};
 use crate::bench::scaling::Scaling;
-use plotters::chart::SeriesLabelPosition;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::prelude::DrawingBackend;
@@ -59,12 +58,22 @@ impl ScalingPanel {
     ) -> Drawn<DB> {
         let points = || self.curves.iter().flat_map(|(_, points)| points);
         let x = range(points().map(|p| p.0), [0.8, 1.3]);
-        let [low, high] = range(points().map(|p| p.1), [0.7, 1.4]);
-        // Costs rise to the right: the legend has the upper left, and its share of the height to itself.
-        let legend = 0.04 + 0.065 * (self.curves.len() + self.marks.len()) as f64;
-        let y = [low, high * (high / low).powf(legend / (1.0 - legend))];
+        let y = range(points().map(|p| p.1), [0.7, 1.4]);
+        // Beyond the chart a mark would be drawn along its edge.
+        let dashes = [Dashes::LONG, Dashes::SHORT];
+        let marks = self.marks.iter().zip(dashes);
+        let marks: Vec<_> = marks
+            .filter(|((at, _), _)| (x[0]..x[1]).contains(at))
+            .collect();
+        let curves = self.curves.iter().enumerate();
+        let curves = curves.map(|(i, (name, _))| (Sample::Curve(i), (*name).to_owned()));
+        let named = marks
+            .iter()
+            .map(|((_, what), dashes)| (Sample::Dashes(*dashes), what.clone()));
+        let legend: Vec<_> = curves.chain(named).collect();
+        let area = pen.legend(area, &legend)?;
         let mut chart = pen.axes(
-            area,
+            &area,
             &Axes {
                 title: &self.title,
                 names: [self.things, "nanoseconds per path"],
@@ -72,23 +81,13 @@ impl ScalingPanel {
                 y_label: plain,
             },
         )?;
-        let dashes = [[6.0, 4.0], [2.0, 3.0]];
-        for ((at, what), dashes) in self.marks.iter().zip(dashes) {
-            // Beyond the chart it would be drawn along its edge.
-            if (x[0]..x[1]).contains(at) {
-                pen.dashes(
-                    &mut chart,
-                    [(*at, y[0]), (*at, y[1])],
-                    dashes,
-                    [0.0, 1.0],
-                    what,
-                )?;
-            }
+        for ((at, _), dashes) in marks {
+            pen.dashes(&mut chart, [(*at, y[0]), (*at, y[1])], dashes)?;
         }
-        for (i, (name, points)) in self.curves.iter().enumerate() {
-            pen.curve(&mut chart, i, name, points)?;
+        for (i, (_, points)) in self.curves.iter().enumerate() {
+            pen.curve(&mut chart, i, points)?;
         }
-        pen.legend(&mut chart, SeriesLabelPosition::UpperLeft)
+        Ok(())
     }
 }
 

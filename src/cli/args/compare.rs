@@ -50,6 +50,8 @@ Each scene DIR/NAME.toml is rendered with the settings and sample count of its g
 a different seed. The two are compared as by `etendue compare`. A scene that differs leaves golden/NAME.actual.npz and \
 golden/NAME.report.html.
 
+--bless leaves goldens alone that still pass, unless --size, --power or --max-spp asks for others.
+
 Examples:
   etendue regress scenes --bless
   etendue regress scenes --junit results.xml --html results.html
@@ -60,7 +62,7 @@ or its golden is damaged or of another scene), or there is nothing to compare; 3
 pub struct RegressArgs {
     /// Folder with the scenes
     pub dir: PathBuf,
-    /// Re-create the goldens
+    /// Create the goldens, and re-create those that no longer pass
     #[arg(long)]
     pub bless: bool,
     /// Run only scenes whose name contains TEXT
@@ -81,14 +83,14 @@ pub struct RegressArgs {
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
 
-    /// Smallest change of the whole picture's brightness to detect with 95 % probability. Sets the number of samples
-    #[arg(long, value_name = "X", default_value = "1%", value_parser = values::change, allow_hyphen_values = true,
+    /// Smallest change of the whole picture's brightness to detect with 95 % probability. Sets the number of samples [default: 1%]
+    #[arg(long, value_name = "X", value_parser = values::change, allow_hyphen_values = true,
           requires = "bless", help_heading = "With --bless")]
-    pub power: f64,
-    /// Most samples per pixel. At least 2 strata² are taken, so that the error can be estimated
-    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = values::samples, allow_hyphen_values = true,
+    pub power: Option<f64>,
+    /// Most samples per pixel. At least 2 strata² are taken, so that the error can be estimated [default: 4096]
+    #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true,
           requires = "bless", help_heading = "With --bless")]
-    pub max_spp: u64,
+    pub max_spp: Option<u64>,
     /// Width and height in pixels [default: the scene's, scaled to 64 wide]
     #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, requires = "bless",
           help_heading = "With --bless")]

@@ -4,6 +4,7 @@
 use super::{Warnings, called, is_dielectric};
 use crate::coincidence::{COINCIDENT, Flat};
 use crate::scene::{Place, Scene, Shape};
+use glam::DVec3;
 
 /// Kinds of surface, in the order in which surfaces that coincide are met.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -32,6 +33,9 @@ struct Thing {
     faces: Vec<Face>,
 }
 
+/// Faces closer than this, relative to the size of the smaller, were meant to be in one plane.
+pub(super) const ROUNDING: f64 = 1e-9;
+
 /// One warning for every pair of things with suspect coincident surfaces.
 pub(super) fn warnings(scene: &Scene) -> Warnings {
     let things = things(scene);
@@ -48,6 +52,21 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
                         "{} coincides with {}, which rays meet first from both sides",
                         called(second.kind, second.place.line),
                         called(first.kind, first.place.line),
+                    )
+                });
+            } else if let Some(gap) = around_eye(a, b, scene.camera.eye) {
+                let [one, other] = [a, b].map(|t| called(t.kind, t.place.line));
+                // A light is `a`.
+                let place = if a.shape.is_none() { a.place } else { b.place };
+                let so = if a.shape.is_none() {
+                    format!("none of the light reaches the {}", b.kind)
+                } else {
+                    "a ray that leaves one does not meet the other".to_owned()
+                };
+                warnings.add(place, || {
+                    format!(
+                        "{other} and {one} count as one surface, because they are {gap} apart, less than a millionth of the \
+                         smaller one's radius: {so}, though the eye is between them"
                     )
                 });
             }
@@ -132,6 +151,23 @@ fn suspect(a: &Thing, b: &Thing) -> Option<(Rank, Rank)> {
     None
 }
 
+/// The distance between two faces that count as one, though the eye is between them.
+fn around_eye(a: &Thing, b: &Thing, eye: DVec3) -> Option<f64> {
+    let pairs = a
+        .faces
+        .iter()
+        .flat_map(|f| b.faces.iter().map(move |g| (&f.flat, &g.flat)));
+    let mut gaps = pairs.filter_map(|(f, g)| {
+        // The plane of a disk may be tilted a little against an infinite plane, whose centre is far away.
+        let (small, large) = if f.radius <= g.radius { (f, g) } else { (g, f) };
+        let heights = [small.center, eye].map(|p| large.normal.dot(p - large.center));
+        let share = heights[1] / heights[0];
+        let apart = heights[0].abs() > ROUNDING * small.radius && 0.0 < share && share < 1.0;
+        (apart && f.coincides(g, COINCIDENT)).then_some(heights[0].abs())
+    });
+    gaps.next()
+}
+
 fn both_but_one_opaque(a: &Thing, b: &Thing) -> bool {
     a.dielectric != b.dielectric
 }
@@ -204,6 +240,36 @@ mod tests {
         let ceiling = FLOOR.replace("[0,0,0]", "[0,4,0]");
         assert!(!suspect(&ceiling));
         assert!(suspect(&ceiling.replace("white", "glass")));
+    }
+
+    /// The eye is at a height of 1.
+    #[test]
+    fn a_ceiling_of_light_that_counts_as_part_of_the_floor() {
+        let ceiling = |radius: f64| {
+            format!(
+                "{FLOOR}[[light]]\ncenter = [0,10,0]\nnormal = [0,-1,0]\nradius = {radius}\nradiance = [1,1,1]\n"
+            )
+        };
+        let line = with("").lines().count() + 1;
+        let expected = format!(
+            "the plane at line {line} and the light at line {} count as one surface, because they are 10 apart",
+            line + 4
+        );
+        assert!(warned(&ceiling(1.1e7), &expected));
+        assert!(warned(
+            &ceiling(1.1e7),
+            "none of the light reaches the plane, though the eye is between them"
+        ));
+        assert!(!suspect(&ceiling(0.9e7)));
+        let below = ceiling(1.1e7).replace("[0,10,0]", "[0,0.5,0]");
+        assert!(!suspect(&below), "the eye is above both");
+        let lid = format!("{FLOOR}{}", disk("[0,10,0]", "[0,1,0]", 1.1e7, "red"));
+        assert!(warned(
+            &lid,
+            "a ray that leaves one does not meet the other"
+        ));
+        let ground = ceiling(1.1e7).replace(FLOOR, &disk("[0,0,0]", "[0,1,0]", 1.2e7, "white"));
+        assert!(suspect(&ground));
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Distances and hits in f64. Only the lints use them, never rendering.
 
+use crate::coincidence::{COINCIDENT, parallel};
 use crate::scene::{Light, Shape};
 use glam::DVec3;
 
@@ -57,6 +58,28 @@ pub(super) fn farthest_on_cylinder(base: DVec3, top: DVec3, radius: f64, p: DVec
     let at = InCylinder::new(base, top, p);
     let height = at.height.abs().max((at.length - at.height).abs());
     height.hypot(at.rho + radius)
+}
+
+/// How far a shape reaches in front of the plane through `point` with this unit normal; negative if all of it is behind.
+pub(super) fn reach(shape: &Shape, point: DVec3, normal: DVec3) -> f64 {
+    let height = |p: DVec3| normal.dot(p - point);
+    let rim = |axis: DVec3, radius: f64| radius * normal.cross(axis).length();
+    match *shape {
+        Shape::Sphere { center, radius } => height(center) + radius,
+        Shape::Plane {
+            point: p,
+            normal: n,
+        } if parallel(n, normal, COINCIDENT) => height(p),
+        Shape::Plane { .. } => f64::INFINITY,
+        Shape::Disk {
+            center,
+            normal: n,
+            radius,
+        } => height(center) + rim(n, radius),
+        Shape::Cylinder { base, top, radius } => {
+            height(base).max(height(top)) + rim((top - base).normalize(), radius)
+        }
+    }
 }
 
 /// The length that the tolerance is relative to; infinite for planes.
@@ -197,6 +220,30 @@ mod tests {
         }
         let far = farthest_on_cylinder(DVec3::ZERO, DVec3::Y * 3.0, 2.0, DVec3::new(1.0, 7.0, 0.0));
         assert!(near(far, 58f64.sqrt()), "{far}");
+    }
+
+    #[test]
+    fn how_far_shapes_reach() {
+        let above = |shape: &Shape, y: f64| reach(shape, DVec3::Y * y, DVec3::Y);
+        assert!(near(above(&CYLINDER, 1.0), 2.0));
+        assert!(near(reach(&CYLINDER, DVec3::X, DVec3::X), 1.0));
+        let ball = Shape::Sphere {
+            center: DVec3::ZERO,
+            radius: 1.5,
+        };
+        assert!(near(above(&ball, 2.0), -0.5));
+        let tilted = Shape::Disk {
+            center: DVec3::Y,
+            normal: DVec3::new(0.6, 0.8, 0.0),
+            radius: 2.0,
+        };
+        assert!(near(above(&tilted, 0.0), 2.2));
+        let plane = |normal| Shape::Plane {
+            point: DVec3::Y,
+            normal,
+        };
+        assert!(near(above(&plane(DVec3::NEG_Y), 4.0), -3.0));
+        assert_eq!(above(&plane(DVec3::X), 4.0), f64::INFINITY);
     }
 
     /// A hit lies on the surface and nothing lies before it, for rays from all over.

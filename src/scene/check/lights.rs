@@ -1,6 +1,7 @@
 //! Lights that contribute nothing to the picture.
 
-use super::geometry::{disk_of, hit, points_on_disk, signed_distance};
+use super::coincide::ROUNDING;
+use super::geometry::{disk_of, hit, points_on_disk, reach, signed_distance};
 use super::{Warnings, called, is_dielectric};
 use crate::coincidence::{COINCIDENT, in_plane, slack};
 use crate::scene::{Light, Primitive, Scene, Shape};
@@ -35,7 +36,10 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
         // Start in front of the light itself and of what it is flush on. Distance does not say whether a flush surface is in front
         // or behind.
         let start = 2.0 * slack(l.radius);
+        // What is beyond the eye covers nothing, however large the light is.
+        let eye = l.normal.dot(scene.camera.eye - l.center);
         let reach = COVER * l.radius;
+        let reach = if eye > 0.0 { reach.min(eye) } else { reach };
         let is_covered = |shape: &Shape| {
             if signed_distance(shape, l.center).abs() > l.radius + reach {
                 return false;
@@ -62,18 +66,9 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
 
 /// Lights on the other side of an opaque plane than the eye, and lights inside an opaque solid that the eye is outside of.
 pub(super) fn unseen(scene: &Scene) -> Warnings {
-    let eye = scene.camera.eye;
-    let walls: Vec<&Primitive> = scene
-        .primitives
-        .iter()
-        .filter(|p| !is_dielectric(scene, p))
-        .collect();
     let mut warnings = Warnings::default();
     for l in &scene.lights {
-        let hidden = walls
-            .iter()
-            .find_map(|p| Some((p, hidden_by(&p.shape, l, eye)?)));
-        if let Some((p, how)) = hidden {
+        if let Some((p, how)) = hidden(scene, l) {
             let light = called("light", l.line);
             let wall = called(p.shape.kind(), p.line);
             warnings.add(l.place(), || {
@@ -82,6 +77,38 @@ pub(super) fn unseen(scene: &Scene) -> Warnings {
         }
     }
     warnings
+}
+
+/// Lights with nothing in front of them, but for those that have another warning.
+pub(super) fn turned_away(scene: &Scene) -> Warnings {
+    let mut warnings = Warnings::default();
+    let shining = scene.lights.iter().filter(|l| l.radiance != DVec3::ZERO);
+    for l in shining.filter(|l| faces_nothing(scene, l) && hidden(scene, l).is_none()) {
+        let light = called("light", l.line);
+        warnings.add(l.place(), || {
+            format!(
+                "{light} faces away from everything: neither the eye nor any surface is in front of it, so none of its light \
+                 reaches the eye"
+            )
+        });
+    }
+    warnings
+}
+
+/// What certainly hides all light of `l` from the eye, and how.
+fn hidden<'s>(scene: &'s Scene, l: &Light) -> Option<(&'s Primitive, &'static str)> {
+    let mut walls = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
+    walls.find_map(|p| Some((p, hidden_by(&p.shape, l, scene.camera.eye)?)))
+}
+
+/// Whether the eye and all surfaces are behind the light.
+fn faces_nothing(scene: &Scene, l: &Light) -> bool {
+    let slack = ROUNDING * l.radius;
+    l.normal.dot(scene.camera.eye - l.center) <= slack
+        && scene
+            .primitives
+            .iter()
+            .all(|p| reach(&p.shape, l.center, l.normal) <= slack)
 }
 
 /// How an opaque shape certainly hides all light of `l` from the eye, in words that precede the shape's name.
@@ -95,7 +122,10 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
             let tilt = normal.cross(l.normal).length();
             if height + l.radius * tilt < -slack {
                 Some("is hidden from the eye behind")
-            } else if flush(normal, l, height) && normal.dot(l.normal) < 0.0 {
+            } else if height <= ROUNDING * l.radius
+                && flush(normal, l, height)
+                && normal.dot(l.normal) < 0.0
+            {
                 Some("lies on and faces into")
             } else {
                 None
@@ -199,9 +229,35 @@ mod tests {
         assert!(!found(super::covered, &ceiling.replace("white", "glass")));
         let lamp = light("[0,3.9998,0]", "[0,1,0]", "[1,1,1]");
         assert!(found(super::covered, &lamp), "two lights face to face");
+        let far = light("[0,5,0]", "[0,-1,0]", "[1,1,1]").replace("radius = 0.5", "radius = 9e3");
+        let floor = plane("[0,0,0]", "[0,1,0]", "white");
+        assert!(
+            !found(super::covered, &(far + &floor)),
+            "the eye is between"
+        );
         let slab =
             "[[cylinder]]\nbase = [0,3,0]\ntop = [0,3.9998,0]\nradius = 2\nmaterial = 'red'\n";
         assert!(found(super::covered, slab));
+    }
+
+    #[test]
+    fn lights_that_face_nothing() {
+        // The ball reaches up to 1, and the eye is at 1.
+        let away = |y: f64| light(&format!("[0,{y},0]"), "[0,1,0]", "[1,1,1]");
+        let told = |text: &str| found(super::turned_away, text);
+        assert!(warned(&away(1.5), "faces away from everything"));
+        assert!(!told(&away(0.9)), "the ball's top, and the eye");
+        assert!(!told(&away(1.5).replace("[0,1,0]", "[0,-1,0]")));
+        let ceiling = |y: f64| away(1.5) + &plane(&format!("[0,{y},0]"), "[0,-1,0]", "white");
+        assert!(!told(&ceiling(3.0)));
+        assert!(!told(&ceiling(1.5)), "it faces into what it lies on");
+        let wall = away(1.5) + &plane("[0,0,-3]", "[0,0,1]", "white");
+        assert!(!told(&wall), "walls have no end");
+        let dark = away(1.5).replace("[1,1,1]", "[0,0,0]");
+        assert!(!told(&dark), "it emits nothing");
+        let wide = away(1.5).replace("[0,1,0]", "[0,-1,0]");
+        let wide = wide.replace("radius = 0.5", "radius = 1e7");
+        assert!(!told(&wide), "a ceiling of light");
     }
 
     #[test]
