@@ -1,9 +1,11 @@
 // A walk through a tree of boxes, whose leaves name a surface.
 // A template: src/kernel/trees.rs fills in the names that begin with a dollar sign, once for the nearest hit and once for shadow rays.
 
-fn $walk(ray: Ray, first: Hit) -> Hit {
-    var hit = first;
-    let slabs = slabs_of(ray, bitcast<f32>(record($header).x));
+fn $walk(start: Ray, first: Hit) -> Hit {
+    let near = approach(start, record($header));
+    let ray = near.ray;
+    var hit = brought_near(first, near);
+    let slabs = slabs_of(ray);
     var at = Place(1u, 0u);
     while at.node != 0u && $goes_on trips_left > 0u {
         trips_left -= 1u;
@@ -20,7 +22,7 @@ fn $walk(ray: Ray, first: Hit) -> Hit {
             hit = $keep(hit, $call, item);
         }
     }
-    return hit;
+    return put_back(hit, near, first);
 }
 
 fn $walk_visit(slabs: Slabs, at: Place, t: f32, item: ptr<function, u32>) -> Place {

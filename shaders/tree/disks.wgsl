@@ -1,9 +1,11 @@
 // A walk through a tree of disks, whose leaves hold the disks.
 // A template: src/kernel/trees.rs fills in the names that begin with a dollar sign, once for the nearest hit and once for shadow rays.
 
-fn $walk(ray: Ray, first: Hit) -> Hit {
-    var hit = first;
-    let slabs = slabs_of(ray, bitcast<f32>(record($header).x));
+fn $walk(start: Ray, first: Hit) -> Hit {
+    let near = approach(start, record($header));
+    let ray = near.ray;
+    var hit = brought_near(first, near);
+    let slabs = slabs_of(ray);
     var at = Place(1u, 0u);
     while at.node != 0u && $goes_on trips_left > 0u {
         trips_left -= 1u;
@@ -11,7 +13,7 @@ fn $walk(ray: Ray, first: Hit) -> Hit {
         at = $walk_visit(ray, slabs, at, &hit);
         at = $walk_visit(ray, slabs, at, &hit);
     }
-    return hit;
+    return put_back(hit, near, first);
 }
 
 fn $walk_visit(ray: Ray, slabs: Slabs, at: Place, hit: ptr<function, Hit>) -> Place {

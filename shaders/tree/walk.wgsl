@@ -12,8 +12,8 @@
 //   a disk     centre, radius; normal, offset; item, face, 0, LEAF
 //   the rest   item in the first word, LEAF in the twelfth
 //
-// A header of four records stands before each tree. Its first word is how far the tree reaches from the origin. Node 0 has two boxes
-// that nothing meets: a walk goes there when it is done.
+// A header of four records stands before each tree. Its first record is a sphere around the tree: centre and radius. Node 0 has two
+// boxes that nothing meets: a walk goes there when it is done.
 const LEAF: u32 = 0xffffffffu;
 
 // Farther than anything.
@@ -23,23 +23,51 @@ const MISSED: f32 = 1.0e38;
 // again in the next dispatch.
 var<private> trips_left: u32 = 0xffffffffu;
 
+// A ray that starts far from a tree, moved along its direction to where the tree begins.
+struct Approach {
+    ray: Ray,
+    // How far it was moved.
+    moved: f32,
+}
+
+// A point in the distance is known only to about |o| 2^-24. If the tree is smaller than that, such a ray might meet any box, and a walk
+// would visit them all. Moved, it is one certain ray. Rays that start within a thousand radii of the centre stay as they are: nearly all do.
+fn approach(ray: Ray, header: vec4u) -> Approach {
+    let around = bitcast<vec4f>(header);
+    let to = around.xyz - ray.o;
+    let far = dot(to, to) > 1.0e6 * around.w * around.w;
+    let moved = select(0.0, fmax(dot(to, ray.d) - 2.0 * around.w, 0.0), far);
+    return Approach(Ray(ray.o + moved * ray.d, ray.d, ray.face, ray.medium, ray.target_face), moved);
+}
+
+// A hit, seen from where the ray was moved to.
+fn brought_near(hit: Hit, near: Approach) -> Hit {
+    return Hit(hit.t - near.moved, hit.key);
+}
+
+// A hit of the moved ray, seen from where the ray starts; `first` if it is none.
+fn put_back(hit: Hit, near: Approach, first: Hit) -> Hit {
+    return Hit(select(first.t, hit.t + near.moved, hit.key != first.key), hit.key);
+}
+
 // A ray made ready for boxes.
 struct Slabs {
     // The ray's origin, moved by the greatest rounding error of the origin or of a hit: `enter` for the sides of a box by which the ray
-    // enters, `leave` for those by which it leaves. The walk must not miss what a loop over all surfaces would meet.
+    // enters, `leave` for those by which it leaves. The walk must not miss what a loop over all surfaces would meet. The boxes make up
+    // for the rounding errors of what they hold: see src/world/tree.rs.
     enter: vec3f,
     leave: vec3f,
     inverse: vec3f,
     backwards: vec3<bool>,
 }
 
-fn slabs_of(ray: Ray, reach: f32) -> Slabs {
+fn slabs_of(ray: Ray) -> Slabs {
     // Components that are zero or almost zero, of either sign, are replaced, so that the inverse is finite.
     let d = select(ray.d, vec3f(1.0e-20), abs(ray.d) < vec3f(1.0e-20));
     let inverse = 1.0 / d;
     let backwards = d < vec3f(0.0);
     // About sixteen units in the last place of f32.
-    let slack = 1.0e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z) + reach);
+    let slack = 1.0e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z));
     let against = select(vec3f(slack), vec3f(-slack), backwards);
     return Slabs(ray.o + against, ray.o - against, inverse, backwards);
 }

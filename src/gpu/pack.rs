@@ -64,8 +64,7 @@ fn pack_trees(
         debug_assert_eq!(records.len(), group.header);
         let tree = Tree::new(&trees::boxes(world, group));
         let root = &tree.nodes[1];
-        let reach: f32 = root.min.iter().chain(&root.max).map(|x| x.abs()).sum();
-        records.extend([[reach.to_bits(), 0, 0, 0], [0; 4], [0; 4], [0; 4]]);
+        records.extend([root.sphere().map(f32::to_bits), [0; 4], [0; 4], [0; 4]]);
         let number = |item: u32| group.numbers[item as usize];
         let code = |item: u32| 2 * (number(item) as u32 + 1) + u32::from(blocks[number(item)]);
         for k in 0..group.nodes() {

@@ -90,6 +90,13 @@ impl Node {
         max: [-2e30; 3],
         item: None,
     };
+
+    /// Centre and radius of a sphere around the box.
+    pub fn sphere(&self) -> [f32; 4] {
+        let [x, y, z] = [0, 1, 2].map(|k| 0.5 * (self.min[k] + self.max[k]));
+        let half = [0, 1, 2].map(|k| 0.5 * (self.max[k] - self.min[k]));
+        [x, y, z, half.iter().map(|h| h * h).sum::<f32>().sqrt()]
+    }
 }
 
 /// A hierarchy over numbered boxes.
@@ -121,15 +128,20 @@ impl Box32 {
         max: [f32::NEG_INFINITY; 3],
     };
 
-    /// A box in f32 that holds `b` even after the corners of what it bounds were rounded to f32: it is one step larger on
-    /// each side. No coordinate is near the subnormal numbers, with which a processor takes a hundred cycles for a product. They
+    /// A box in f32 that holds `b` even after the corners of what it bounds were rounded to f32, and after the rounding errors of a test
+    /// in f32 for what it bounds: on each side it is larger by sixteen units in the last place of its corners. No coordinate is near the subnormal numbers, with which a processor takes a hundred cycles for a product. They
     /// would be common, because things stand on floors at 0.
     fn outwards(b: &Bounds) -> Self {
         const TINY: f32 = 1e-25;
+        let slack = 1e-6 * b.min.abs().max(b.max.abs()).element_sum();
         let normal = |x: f32, instead: f32| if x.abs() < TINY { instead } else { x };
         Self {
-            min: (b.min.to_array()).map(|x| normal((x as f32).next_down(), -TINY)),
-            max: (b.max.to_array()).map(|x| normal((x as f32).next_up(), TINY)),
+            min: (b.min - slack)
+                .to_array()
+                .map(|x| normal((x as f32).next_down(), -TINY)),
+            max: (b.max + slack)
+                .to_array()
+                .map(|x| normal((x as f32).next_up(), TINY)),
         }
     }
 
