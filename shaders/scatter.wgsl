@@ -18,10 +18,6 @@ fn interaction(ray: Ray, hit: Hit, way: u32) -> Interaction {
     );
 }
 
-fn is_specular(material: Material) -> bool {
-    return is_mirror(material) | is_dielectric(material);
-}
-
 // Gathers direct light at `hit` and sends the path on. False if the path ends there, or meets no surface.
 fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) -> bool {
     var x = interaction(path.ray, hit, way_at_glass(path, pixel, film.s, sight));
@@ -35,7 +31,7 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
 
     // Direct light, where the surface scatters into more than one direction.
     let key = vec4u(pixel.key, film.s, path.depth, vertex_seed(path));
-    let u = draw_vertex(key, path.all_specular, is_phong(x.material));
+    let u = draw_vertex(key, path.all_specular, is_glossy(x.material));
     let receiver = receiver_at(&x);
     let direct = direct_light_if(goes_on & !specular, &x, receiver, key, u, path.depth, film);
     // Not even zero is added where nothing is asked: beta may have left f32.

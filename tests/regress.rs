@@ -150,7 +150,13 @@ fn the_page_has_failures_first_and_says_where_it_comes_from() {
     let f = Folder::new(&["one", "two"]);
     f.bless();
     let (film, _) = render(&BALL.replace("20.0, 20.0", "30.0, 30.0"), 5, 64);
-    write_exr(&f.golden("two.exr"), &film, &render(BALL, 5, 64).1).expect("written");
+    write_exr(
+        &f.golden("two.exr"),
+        &film,
+        &render(BALL, 5, 64).1,
+        ExrChannels::All,
+    )
+    .expect("written");
     f.run(&["--html", f.path("r.html").to_str().unwrap()])
         .code(1);
     let page = std::fs::read_to_string(f.path("r.html")).expect("written");
@@ -191,10 +197,10 @@ fn goldens_that_still_pass_are_left_alone() {
 
     // Another film of the scene, which passes, and one of another lamp, which does not.
     let (film, provenance) = render(BALL, 7, 256);
-    write_exr(&f.golden("one.exr"), &film, &provenance).expect("written");
+    write_exr(&f.golden("one.exr"), &film, &provenance, ExrChannels::All).expect("written");
     let kept = golden("one.exr");
     let (film, _) = render(&BALL.replace("20.0, 20.0", "30.0, 30.0"), 5, 64);
-    write_exr(&f.golden("two.exr"), &film, &provenance).expect("written");
+    write_exr(&f.golden("two.exr"), &film, &provenance, ExrChannels::All).expect("written");
     f.run(&["--bless", "--power", "5%"])
         .code(0)
         .stdout(contains(

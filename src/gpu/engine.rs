@@ -143,8 +143,8 @@ impl GpuEngine {
         if let Some(problem) = scene::too_large(&packed, world.surface_count(), &device.limits()) {
             return Err(unable(problem));
         }
-        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let oom = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         tell(Making::Compiling);
         // SAFETY: without runtime checks the kernel must not index out of bounds or loop for ever. All its
         // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
@@ -160,6 +160,11 @@ impl GpuEngine {
                 wgpu::ShaderRuntimeChecks::unchecked(),
             )
         };
+        let invalid = pollster::block_on(scope.pop());
+        if let Some(error) = invalid {
+            return Err(GpuError::Kernel(error.to_string()));
+        }
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let scene_layout = scene::layout(device, kernel.access);
         let film_layout = tile::layout(device);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -183,8 +188,8 @@ impl GpuEngine {
             mapped_at_creation: false,
         });
         let errors = [
-            pollster::block_on(oom.pop()),
             pollster::block_on(scope.pop()),
+            pollster::block_on(oom.pop()),
         ];
         if let Some(error) = errors.into_iter().flatten().next() {
             return Err(unable(format!("the driver rejected the kernel: {error}")));

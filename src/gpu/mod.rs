@@ -22,6 +22,11 @@ pub enum GpuError {
     /// No adapter at all, or none with the name asked for.
     #[error("{0}")]
     NoAdapter(String),
+    /// The kernel is not valid WGSL, whatever the adapter.
+    #[error(
+        "the kernel made for this scene is invalid, which is a bug of etendue: please report it with the scene: {0}"
+    )]
+    Kernel(String),
     /// The adapter cannot do what this picture needs.
     #[error("{adapter}: {problem}")]
     Unable {

@@ -199,7 +199,7 @@ impl Features {
 
     /// Whether lights are sampled for lobes.
     pub fn glossy(&self) -> bool {
-        self.light_sampling && self.has_material(MaterialKind::Phong)
+        self.light_sampling && self.materials.iter().any(|m| m.is_glossy())
     }
 
     /// Whether light met by chance is weighed against light sampling anywhere.

@@ -81,6 +81,16 @@ modules! {
     IMAGES_SOUGHT = "image/sought",
 }
 
+/// How a material scatters.
+fn of_material(kind: MaterialKind) -> Module {
+    match kind {
+        MaterialKind::Diffuse => DIFFUSE,
+        MaterialKind::Mirror => MIRROR,
+        MaterialKind::Dielectric => DIELECTRIC,
+        MaterialKind::Phong => PHONG,
+    }
+}
+
 /// The path loop, and what belongs to it alone.
 pub(super) fn of_path(f: &Features) -> Vec<Module> {
     let mut modules = vec![
@@ -138,17 +148,10 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
             .filter(|(kind, _)| f.has_shape(*kind))
             .map(|s| s.1),
     );
-    let materials = [
-        (MaterialKind::Diffuse, DIFFUSE),
-        (MaterialKind::Mirror, MIRROR),
-        (MaterialKind::Dielectric, DIELECTRIC),
-        (MaterialKind::Phong, PHONG),
-    ];
     if f.scatters() {
         modules.push(COSINE);
     }
-    let used = materials.iter().filter(|(kind, _)| f.has_material(*kind));
-    modules.extend(used.map(|m| m.1));
+    modules.extend(f.materials().map(of_material));
     modules.push(DISK_LIGHT);
     modules.push(if glossy {
         RECEIVER_GLOSSY

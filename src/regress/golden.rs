@@ -179,7 +179,7 @@ pub(super) fn write(path: &Path, film: &Film, provenance: &Provenance) -> Result
         seconds: 0.0,
         ..provenance.clone()
     };
-    write_exr(path, film, &untimed)
+    write_exr(path, film, &untimed, ExrChannels::All)
 }
 
 /// A golden is no evidence if comparisons with it do not detect a change of the whole picture's brightness by so much: it holds

@@ -93,12 +93,16 @@ pub fn open(
 /// The note that the CPU reference renders instead, if that is allowed; else the failure.
 fn instead(e: &GpuError, backend: Backend, adapter: Option<&str>) -> Result<String, Error> {
     match e {
+        // The reference would hide it.
+        GpuError::Kernel(_) => Err(Error::Device(format!(
+            "{e}; --backend cpu renders without a kernel"
+        ))),
         _ if backend == Backend::Auto && adapter.is_none() => {
             let faster = match e {
                 GpuError::NoAdapter(_) => {
                     format!(" (to install a faster software adapter: {GET_ADAPTER})")
                 }
-                GpuError::Unable { .. } => String::new(),
+                GpuError::Kernel(_) | GpuError::Unable { .. } => String::new(),
             };
             Ok(format!("{e}; rendering on the CPU reference{faster}"))
         }

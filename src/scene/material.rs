@@ -103,28 +103,36 @@ impl Bsdf {
     }
 }
 
-/// The `type` of a material. Shaders know it by its number, in this order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum MaterialKind {
-    Diffuse,
-    Mirror,
-    Dielectric,
-    Phong,
+macro_rules! material_kinds {
+    ($($kind:ident = $name:literal,)*) => {
+        /// The `type` of a material. Shaders know it by its number.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub(crate) enum MaterialKind {
+            $($kind,)*
+        }
+
+        impl MaterialKind {
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$kind),*];
+
+            /// Its name in scene files, and in the shaders' functions: `sample_NAME`, `evaluate_NAME`, `is_NAME`.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$kind => $name,)*
+                }
+            }
+        }
+    };
+}
+
+// The order is that of their numbers. A new one comes last.
+material_kinds! {
+    Diffuse = "diffuse",
+    Mirror = "mirror",
+    Dielectric = "dielectric",
+    Phong = "phong",
 }
 
 impl MaterialKind {
-    pub const ALL: [Self; 4] = [Self::Diffuse, Self::Mirror, Self::Dielectric, Self::Phong];
-
-    /// Its name in scene files, and in the shaders' functions: `sample_NAME`, `evaluate_NAME`, `is_NAME`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Diffuse => "diffuse",
-            Self::Mirror => "mirror",
-            Self::Dielectric => "dielectric",
-            Self::Phong => "phong",
-        }
-    }
-
     /// Whether it scatters into a few directions only, so that there is nothing to evaluate.
     pub fn is_specular(self) -> bool {
         match self {
@@ -133,7 +141,16 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it is sampled by the cosine alone. Light sampling then covers all its directions about as well.
+    /// Whether it has a lobe: light from some directions counts far more than from others.
+    pub fn is_glossy(self) -> bool {
+        match self {
+            Self::Phong => true,
+            Self::Diffuse | Self::Mirror | Self::Dielectric => false,
+        }
+    }
+
+    /// Whether light sampling covers all its directions about as well as sampling by the cosine does. Then light sampling alone counts,
+    /// and `Scattered.pdf` is 0. Either answer is right; the wrong one is noisy.
     pub fn is_matt(self) -> bool {
         match self {
             Self::Diffuse => true,

@@ -242,9 +242,11 @@ impl<'a, 't> Reader<'a, 't> {
             .filter(|&kind| schema::material_keys(kind).iter().any(|k| k == key))
             .map(MaterialKind::name)
             .collect();
-        if owners.is_empty() {
+        let [first @ .., last] = &owners[..] else {
             return String::new();
-        }
-        format!("; it belongs to {}", owners.join(" and "))
+        };
+        let first = first.join(", ");
+        let and = if first.is_empty() { "" } else { " and " };
+        format!("; it belongs to {first}{and}{last}")
     }
 }

@@ -399,7 +399,7 @@ fn render_repeats_warnings_that_change_the_picture() {
 #[test]
 fn views_that_are_too_narrow_for_a_gpu() {
     let bench = Bench::new();
-    let narrow = crate::program::SCENE.replace("45.0", "1e-6");
+    let narrow = SCENE.replace("45.0", "1e-6");
     fs::write(bench.path("narrow.toml"), narrow).unwrap();
     let told = says("1.1e-9 of its distance wide");
     bench

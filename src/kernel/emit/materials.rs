@@ -31,7 +31,8 @@ pub(in crate::kernel) fn dispatch(features: &Features) -> String {
     s
 }
 
-/// `is_NAME(material)` of every kind. It is constant if the scene has none of the kind, or no other.
+/// `is_NAME(material)` of every kind, which is constant if the scene has none of the kind, or no other; and the traits of materials,
+/// `is_specular` and `is_glossy`.
 pub(in crate::kernel) fn predicates(features: &Features) -> String {
     let mut s = String::new();
     for kind in MaterialKind::ALL {
@@ -44,6 +45,20 @@ pub(in crate::kernel) fn predicates(features: &Features) -> String {
             s,
             "fn is_{}(material: Material) -> bool {{\n    return {value};\n}}\n",
             kind.name()
+        );
+    }
+    for name in ["specular", "glossy"] {
+        let kinds = MaterialKind::ALL.into_iter().filter(|kind| match name {
+            "specular" => kind.is_specular(),
+            _ => kind.is_glossy(),
+        });
+        let any: Vec<String> = kinds
+            .map(|k| format!("is_{}(material)", k.name()))
+            .collect();
+        let _ = writeln!(
+            s,
+            "fn is_{name}(material: Material) -> bool {{\n    return {};\n}}\n",
+            any.join(" | ")
         );
     }
     s
