@@ -209,7 +209,7 @@ fn bad_input_is_named() {
     std::fs::write(p.path("a.tiff"), "x").expect("written");
     run(&a, &p.path("a.tiff"), &[])
         .code(2)
-        .stderr(contains("can be compared (.exr, .png, or .npz film)"));
+        .stderr(contains("not a picture that etendue reads (.exr, .png, or .npz film)"));
     run(&a, &a, &["--alpha", "0"]).code(2);
     run(&a, &a, &["--html", "/nowhere/x.html"]).code(4);
 }

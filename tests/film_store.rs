@@ -374,9 +374,9 @@ fn a_small_file_that_claims_to_be_huge_is_refused_at_once() {
     let mut bytes = fs::read(&path).unwrap();
     forge(&mut bytes, "\"x1\":6,\"y1\":4", "\"x1\":7,\"y1\":4");
     let text = refused(&path, &bytes);
-    let counts =
-        "array \"counts\" has 120 bytes of numbers, but 3 x 6 numbers of type u64 need 144";
-    assert!(text.contains(counts), "{text}");
+    let sizes =
+        "array \"mean\" has 180 bytes of numbers, but 3 x 6 x 3 numbers of type f32 need 216";
+    assert!(text.contains(sizes), "{text}");
 }
 
 #[test]

@@ -146,7 +146,7 @@ fn the_cpu_reference_ends_after_half_a_minute_unless_told_otherwise() {
     bench
         .run("render box.toml --backend cpu --size 1024x768 -o a.png --report r.json")
         .success()
-        .stderr(says("until 256 samples per pixel, or 30 s"))
+        .stderr(says("until 256 spp or 30 s"))
         .stderr(says(
             "note: without a stop condition the CPU reference ends after 30 s",
         ));
