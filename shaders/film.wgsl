@@ -68,7 +68,7 @@ struct PixelFilm {
     sum_1: vec4f,
     sum_2: vec4f,
     sum_3: vec4f,
-    // Rays; truncated paths, and in the upper half 1 + the place in its block of the first sample that was not finite; how many
+    // Rays; truncated paths, FURTHER, and in the upper half 1 + the place in its block of the first sample that was not finite; how many
     // such samples replicates 0 and 1 had, in a half each; and replicates 2 and 3.
     counts: vec4u,
     // The sample under way, the dispatch's first, and one past its last.
@@ -114,6 +114,13 @@ fn store_replicate(pixel: Pixel, film: ptr<function, PixelFilm>, k: u32) {
 
 fn count_ray(film: ptr<function, PixelFilm>, traced: bool) {
     film.counts.x += select(0u, 1u, traced);
+}
+
+// A path has met a surface after it had scattered from another: there, light may come that has not been found yet.
+const FURTHER: u32 = 0x8000u;
+
+fn note_further(film: ptr<function, PixelFilm>, further: bool) {
+    film.counts.y |= select(0u, FURTHER, further);
 }
 
 fn count_truncated(film: ptr<function, PixelFilm>, truncated: bool) {

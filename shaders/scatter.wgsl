@@ -27,6 +27,7 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
     let wanted = meets & !(WHITTED & path.only_lights) & (specular | !is_glance(path)) & trail_goes_on(path.trail, &x);
     let last = path.depth >= LAST_DEPTH;
     count_truncated(film, COUNT_TRUNCATED & last & wanted);
+    note_further(film, meets & !path.all_specular);
     let goes_on = wanted & !last;
 
     // Direct light, where the surface scatters into more than one direction.

@@ -207,9 +207,9 @@ fn bad_input_is_named() {
         .code(4)
         .stderr(contains("none.exr: cannot read: no such file"));
     std::fs::write(p.path("a.tiff"), "x").expect("written");
-    run(&a, &p.path("a.tiff"), &[])
-        .code(2)
-        .stderr(contains("not a picture that etendue reads (.exr, .png, or .npz film)"));
+    run(&a, &p.path("a.tiff"), &[]).code(2).stderr(contains(
+        "not a picture that etendue reads (.exr, .png, or .npz film)",
+    ));
     run(&a, &a, &["--alpha", "0"]).code(2);
     run(&a, &a, &["--html", "/nowhere/x.html"]).code(4);
 }

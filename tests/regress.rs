@@ -244,11 +244,14 @@ fn failures_leave_a_film_and_a_report() {
     f.run(&["--junit", junit.to_str().unwrap()])
         .code(1)
         .stdout(contains("FAILED  one: different in the whole picture"))
-        .stdout(contains("one.report.html").and(contains("--bless --filter one")))
+        .stdout(contains("one.report.html").and(contains("--bless --scene one")))
         .stdout(contains("2 scenes: 1 passed, 1 failed"));
     let xml = std::fs::read_to_string(junit).expect("written");
     assert!(
-        xml.contains("failures=\"1\"") && xml.contains("in the whole picture"),
+        xml.contains("failures=\"1\"")
+            && xml.contains("in the whole picture")
+            && xml.contains("--bless --scene one")
+            && xml.contains("<property name=\"adapter\""),
         "{xml}"
     );
     store::load(&f.golden("one.actual.npz")).expect("the actual film");
@@ -481,4 +484,85 @@ fn the_assertion_says_what_differs_and_how_to_bless() {
     ] {
         assert!(text.contains(told), "{told} is missing: {text}");
     }
+}
+
+/// The hash of a scene does not have it, but the light does.
+#[test]
+fn another_max_depth_is_another_picture() {
+    let f = Folder::new(&["one"]);
+    f.bless();
+    f.put(
+        "one",
+        &BALL.replace("[camera]", "[render]\nmax_depth = 3\n[camera]"),
+    );
+    f.run(&[])
+        .code(2)
+        .stdout(contains("the golden has max_depth 64, but the scene has 3"))
+        .stdout(contains("re-create the golden with --bless --scene one"));
+    f.run(&["--bless"]).code(0).stdout(contains(
+        "the golden before it: the golden has max_depth 64, but the scene has 3",
+    ));
+    f.run(&["-q"]).code(0).stdout("");
+}
+
+#[test]
+fn a_scene_is_chosen_by_its_whole_name() {
+    let f = Folder::new(&["one", "one more"]);
+    f.run(&["--bless", "--scene", "one", "--power", "5%"])
+        .code(0)
+        .stdout(contains("1 of 2 scenes (--scene one): 1 blessed"));
+    assert!(f.golden("one.exr").exists() && !f.golden("one more.exr").exists());
+    f.run(&["--scene", "on"])
+        .code(2)
+        .stderr(contains("no scene or golden has the name \"on\""));
+    f.bless();
+    let samples = read_exr(&f.golden("one more.exr"))
+        .unwrap()
+        .samples
+        .unwrap()[0];
+    let brighter = BALL.replace("20.0, 20.0, 20.0", "24.0, 24.0, 24.0");
+    let (film, _) = render(&brighter, 5, samples.into());
+    let (_, provenance) = render(BALL, 5, samples.into());
+    write_exr(
+        &f.golden("one more.exr"),
+        &film,
+        &provenance,
+        ExrChannels::All,
+    )
+    .expect("written");
+    f.run(&["--quiet"])
+        .code(1)
+        .stdout(contains("--bless --scene 'one more'"))
+        .stdout(contains("passed  one").not());
+}
+
+/// What is done is told, and the rest is not.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_tells_its_results_so_far() {
+    let f = Folder::new(&["a", "b"]);
+    f.bless();
+    // It takes for ever.
+    f.put(
+        "b",
+        &BALL.replace("resolution = [24, 18]", "resolution = [4000, 3000]"),
+    );
+    let junit = f.path("r.xml");
+    let script = "\"$0\" regress \"$1\" --backend cpu --bless --size 4000x3000 --power 0.001% --scene b --junit \"$2\" & pid=$!; sleep 2; kill -TERM $pid; wait $pid";
+    let done = std::process::Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_etendue")])
+        .args([f.0.path(), &junit])
+        .output()
+        .expect("a shell");
+    assert_eq!(done.status.code(), Some(143));
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(
+        said.contains("interrupted: 0 of 1 scenes were done"),
+        "{said}"
+    );
+    assert!(
+        std::fs::read_to_string(junit)
+            .unwrap()
+            .contains("tests=\"0\"")
+    );
 }

@@ -291,6 +291,33 @@ fn seen(fault: &Fault, size: [u32; 2], samples: u64, trials: u32) -> u32 {
     seen
 }
 
+/// The change that a comparison says it would have detected is one of what surfaces reflect, not of the lamp that the eye sees without
+/// noise.
+#[test]
+fn the_change_that_is_stated_is_seen() {
+    let size = [64, 48];
+    let mut camera = Camera::new(scene(&text("diffuse")), size, |_| {});
+    let [a, b] = [901, 902].map(|seed| camera.shoot(seed, 64));
+    let comparison = compare(&a, &b, &Limits::default()).expect("comparable");
+    let change = comparison
+        .verdict
+        .expect("both state their noise")
+        .sensitivity[0]
+        .change;
+    assert!((1e-4..0.1).contains(&change), "{change}");
+    let kept = 1.0 - change;
+    let fault = Fault {
+        name: format!("{kept} of the light that surfaces scatter"),
+        scene: "diffuse",
+        text: None,
+        kernel: Some((
+            "let gathered = path.beta",
+            format!("let gathered = {kept} * path.beta"),
+        )),
+    };
+    assert!(seen(&fault, size, 64, 5) >= 3, "{change}");
+}
+
 /// A quarter of the pixels doubles the noise of the whole, so the faults are twice as large. Were one seen in less than 22 %
 /// of all trials, this would fail with more than 95 % probability: it tells a broken test, the study below the power.
 #[test]

@@ -40,7 +40,9 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
         comparison.notes = vec!["both names lead to the same file".into()];
     }
     progress.finish();
-    write_stdout(&comparison.report())?;
+    if !(args.talk.quiet && comparison.same()) {
+        write_stdout(&comparison.report())?;
+    }
     if let Some(path) = &args.html {
         let page = html::page(&a, &b, LABELS, &comparison);
         atomic::replace(path, |f| f.write_all(page.as_bytes()))?;

@@ -123,6 +123,9 @@ impl Info {
             match &film.coverage[..] {
                 [] => line("sample numbers", "none"),
                 [(_, only)] => line("sample numbers", only),
+                several if several.iter().all(|(_, ranges)| *ranges == several[0].1) => {
+                    line("sample numbers", &several[0].1);
+                }
                 several => {
                     for (rect, ranges) in several.iter().take(LISTED) {
                         line("sample numbers", &format!("{ranges} in {rect}"));

@@ -89,6 +89,8 @@ fn suggest_render(e: &mut clap::Error) {
             .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
     {
         let tip = format!("to render a scene: etendue render {word}");
+        // The most similar command is similar by chance.
+        e.remove(ContextKind::SuggestedSubcommand);
         e.insert(
             ContextKind::Suggested,
             ContextValue::StyledStrs(vec![tip.into()]),

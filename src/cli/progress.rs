@@ -165,6 +165,13 @@ impl Progress {
         }
     }
 
+    /// Prints a line with the bar hidden, unless progress is not shown.
+    pub fn news(&self, text: &str) {
+        if !matches!(self.shown, Shown::Silent) {
+            self.say(text);
+        }
+    }
+
     /// Prints a line with the bar hidden.
     pub fn say(&self, text: &str) {
         self.aside(|| super::say!("{text}"));

@@ -29,11 +29,16 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
     let all = cases(&args.dir)?;
-    let filter = args.filter.as_deref().map(|text| Filter {
-        text,
-        of: all.len(),
-    });
-    let chosen = |case: &Case| filter.is_none_or(|f| case.name.contains(f.text));
+    let unknown = |name: &&String| all.iter().all(|case| case.name != **name);
+    if let Some(name) = args.scene.iter().find(unknown) {
+        let why = format!("no scene or golden has the name \"{name}\"");
+        return Err(FileError::content(&args.dir, why).into());
+    }
+    let filter = Filter::of(args.filter.as_deref(), &args.scene, all.len());
+    let chosen = |case: &Case| {
+        let text = args.filter.as_deref().unwrap_or_default();
+        case.name.contains(text) && (args.scene.is_empty() || args.scene.contains(&case.name))
+    };
     let cases: Vec<Case> = all.into_iter().filter(chosen).collect();
     if !args.talk.quiet {
         for path in almost_scenes(&args.dir)? {
@@ -58,11 +63,14 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
     let device = gpu.map_or_else(CpuEngine::device_info, |gpu| gpu.info().clone());
     let mut done = run(args, &cases, &signals);
     done.sort_by(|a, b| a.case.name.cmp(&b.case.name));
+    let finished = finish(args, &done, filter.as_ref(), device);
     if signals.stop.load(Ordering::Relaxed) {
+        let (done, of) = (done.len(), cases.len());
+        say!("interrupted: {done} of {of} scenes were done");
         let signal = signals.number();
         return Err(Failure::Interrupted { signal });
     }
-    finish(args, &done, filter, device)
+    finished
 }
 
 /// Refuses output files that would overwrite a scene, a golden, or each other.
@@ -103,12 +111,16 @@ fn run(args: &RegressArgs, cases: &[Case], signals: &Signals) -> Vec<Done> {
             scope.spawn(|| {
                 while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let finished = done.lock().unwrap_or_else(|p| p.into_inner()).len();
-                    let mut progress = progress.lock().unwrap_or_else(|p| p.into_inner());
-                    progress.step(finished, cases.len(), &case.name);
-                    drop(progress);
+                    let mut shown = progress.lock().unwrap_or_else(|p| p.into_inner());
+                    shown.step(finished, cases.len(), &case.name);
+                    drop(shown);
                     let Some(one) = run_one(args, case, signals) else {
                         return;
                     };
+                    if !one.outcome.good() {
+                        let progress = progress.lock().unwrap_or_else(|p| p.into_inner());
+                        progress.news(&format!("{}: {}", one.case.name, one.outcome.word()));
+                    }
                     done.lock().unwrap_or_else(|p| p.into_inner()).push(one);
                 }
             });
@@ -160,11 +172,18 @@ fn wanted(args: &RegressArgs) -> Wanted {
 fn finish(
     args: &RegressArgs,
     done: &[Done],
-    filter: Option<Filter>,
+    filter: Option<&Filter>,
     device: DeviceInfo,
 ) -> Result<(), Failure> {
+    let about = About {
+        device,
+        time: SystemTime::now(),
+    };
     let mut list = String::new();
-    for d in done {
+    for d in done
+        .iter()
+        .filter(|d| !(args.talk.quiet && d.outcome.good()))
+    {
         let detail = d.outcome.detail(&d.case);
         list += &format!("{:>9}  {}: {detail}\n", d.outcome.word(), d.case.name);
         if let Outcome::Failed {
@@ -175,21 +194,15 @@ fn finish(
             for line in comparison.findings_text().lines() {
                 list += &format!("          {line}\n");
             }
-            let evidence = match unsaved {
-                None => format!(
-                    "see {} and {}",
-                    d.case.report_path().display(),
-                    d.case.actual_path().display()
-                ),
-                Some(why) => format!("its film and page could not be saved: {why}"),
-            };
             list += &format!(
-                "          {evidence}; if the change is intended, re-create the golden with --bless --filter {}\n",
-                d.case.name
+                "          {}\n",
+                report::advice(&d.case, unsaved.as_deref())
             );
         }
     }
-    list += &format!("{}\n", report::summary(done, filter));
+    if !args.talk.quiet || !list.is_empty() {
+        list += &format!("{}\n", report::summary(done, filter));
+    }
     if args.junit.as_deref().is_some_and(is_stdout) {
         if !args.talk.quiet {
             say!("{}", list.trim_end());
@@ -205,12 +218,11 @@ fn finish(
         }
     }
     if let Some(path) = &args.junit {
-        write_text(path, &report::junit(done))?;
+        write_text(path, &report::junit(done, &about))?;
     }
     if let Some(path) = &args.html {
         let base = path.parent().unwrap_or(Path::new(""));
-        let time = SystemTime::now();
-        let page = report::index(done, filter, &About { device, time }, base);
+        let page = report::index(done, filter, &about, base);
         atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
     }
     let any = |what: fn(&Outcome) -> bool| done.iter().any(|d| what(&d.outcome));

@@ -189,7 +189,11 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     // This looks at every pixel.
     let error = provenance.error(&film);
     if !args.talk.quiet {
-        say_end(&film, &error, &tally, reason, written.list());
+        say_end(args, &film, &error, &tally, reason, written.list());
+        let is_png = |path: &PathBuf| Format::from_path(path) == Ok(Format::Png);
+        if outputs.iter().any(is_png) {
+            say_exposure(&film, args.pictures.exposure);
+        }
         if reason == StopReason::Time && time_is_default {
             say!(
                 "note: without a stop condition the CPU reference ends after {}; for more samples: --spp N or --time TIME",
@@ -387,6 +391,7 @@ fn stop_reason(args: &RenderArgs, reason: StopReason) -> &'static str {
 
 /// The last lines: samples, time, speed, error, and the files written.
 fn say_end(
+    args: &RenderArgs,
     film: &Film,
     error: &RelativeError,
     tally: &Tally,
@@ -414,9 +419,44 @@ fn say_end(
     if let Some(error) = describe(error) {
         text += &format!(", {error}");
     }
+    if let Some(wanted) = args.error.filter(|_| reason != StopReason::Error) {
+        text += &format!("; not yet {} with certainty", percent(wanted));
+    }
     say!("{text}");
     if let Some(list) = written {
         say!("wrote {list}");
+    }
+}
+
+/// A note if most of a PNG picture is white or black, with an exposure that shows it.
+fn say_exposure(film: &Film, stops: f64) {
+    /// Linear values that are pure white and pure black in 8 bits.
+    const WHITE: f64 = 1.0;
+    const BLACK: f64 = 0.5 / 255.0 / 12.92;
+    /// Where the middle of the pixels is to lie.
+    const GREY: f64 = 0.18;
+    let gain = stops.exp2();
+    let mut light = Vec::new();
+    film.for_each(|_, _, e| light.push(e.mean.into_iter().fold(0.0, f64::max)));
+    light.retain(|x| *x > 0.0);
+    let share = |is: &dyn Fn(f64) -> bool| {
+        let count = light.iter().filter(|x| is(**x * gain)).count();
+        count as f64 / light.len().max(1) as f64
+    };
+    let (white, black) = (share(&|x| x > WHITE), share(&|x| x < BLACK));
+    let (share, what) = if white > black {
+        (white, "white")
+    } else {
+        (black, "black")
+    };
+    if share > 0.5 {
+        let middle = light.len() / 2;
+        let (_, median, _) = light.select_nth_unstable_by(middle, f64::total_cmp);
+        let better = (GREY / *median).log2().round();
+        say!(
+            "note: {} of the lit pixels are {what} in the PNG; try --exposure {better:+}",
+            percent(share)
+        );
     }
 }
 
@@ -440,7 +480,8 @@ fn warn(settings: &Settings, counters: &Counters, error: &RelativeError, quiet: 
     let doubt = error.doubt.filter(|_| !quiet);
     match doubt {
         Some(Doubt::NoLight) => say!(
-            "warning: no light found yet: the picture is black, and its error is not known; take more samples (--spp, --time), or see: etendue check"
+            "warning: no light found yet: the picture is black, and its error is not known; if the scene can show light at all \
+             (see: etendue check), take more samples (--spp, --time)"
         ),
         Some(doubt @ Doubt::Unlit(_)) => say!(
             "warning: {doubt}, so the true relative error may be far above the stated one; take more samples (--spp, --time)"

@@ -9,6 +9,9 @@ use crate::stats::luminance;
 /// without noise (such as those of a lamp) would outweigh all others.
 const LEAST_VARIANCE: f64 = 1e-3;
 
+/// A pixel has noise if its error is more than this share of its light: the roundings of sums in f32 are less.
+const NOISELESS: f64 = 1e-5;
+
 /// One channel of both pictures; all 0 in pixels without samples.
 pub(super) struct Terms {
     size: [u32; 2],
@@ -140,6 +143,7 @@ impl Terms {
             variance: 0.0,
             around: 0.0,
             light: 0.0,
+            noisy_light: 0.0,
             dof: [f64::INFINITY; 2],
             means: [0.0; 2],
             error: 0.0,
@@ -157,7 +161,11 @@ impl Terms {
             b.squares += d * d;
             b.variance += w * w * self.variance[i];
             b.around += w * w * self.around[i];
-            b.light += w * 0.5 * (ma + mb);
+            let light = 0.5 * (ma + mb);
+            b.light += w * light;
+            if self.variance[i] > (NOISELESS * light).powi(2) {
+                b.noisy_light += w * light;
+            }
             b.means[0] += ma;
             b.means[1] += mb;
             b.error += self.variance[i];

@@ -55,6 +55,8 @@ pub struct Comparison {
     pub notes: Vec<String>,
     /// Whether every pixel is the same to the bit.
     pub identical: bool,
+    /// What texts call the two pictures.
+    pub(crate) labels: [&'static str; 2],
 }
 
 /// Why two pictures can't be compared.
@@ -130,6 +132,7 @@ pub fn compare(a: &Picture, b: &Picture, limits: &Limits) -> Result<Comparison, 
         exceeded: exceeded.into_iter().flatten().collect(),
         notes: notes(a, b),
         identical,
+        labels: LABELS,
     })
 }
 
@@ -165,8 +168,8 @@ fn notes(a: &Picture, b: &Picture) -> Vec<String> {
         && x == y
     {
         notes.push(format!(
-            "both were rendered with seed {x}, so both may miss the same rare light paths; render one with \
-             another --seed"
+            "both were rendered with seed {x}: they share samples where their sample numbers overlap, and both may miss the \
+             same rare light paths; render one with another --seed"
         ));
     }
     notes

@@ -1,7 +1,7 @@
 //! A comparison in words.
 
 use super::verdict::{Finding, Sensitivity, Verdict};
-use super::{Comparison, LABELS, Metrics};
+use super::{Comparison, Metrics};
 use std::fmt::Write as _;
 
 pub(super) const CHANNELS: [&str; 3] = ["red", "green", "blue"];
@@ -31,7 +31,8 @@ impl Comparison {
         let Some(v) = self.verdict.as_ref().filter(|v| !v.findings.is_empty()) else {
             return String::new();
         };
-        let head = ["where", "channel", "A", "B", "change", "z"];
+        let [a, b] = self.labels;
+        let head = ["where", "channel", a, b, "change", "z"];
         let mut text = row(head.map(str::to_owned));
         for f in &v.findings {
             let [a, b] = f.means;
@@ -57,7 +58,7 @@ impl Comparison {
             text.push('\n');
         }
         text.push('\n');
-        text += &metrics(&self.metrics);
+        text += &metrics(&self.metrics, self.labels);
         for note in &self.notes {
             let _ = writeln!(text, "\nnote: {note}");
         }
@@ -143,9 +144,9 @@ pub(super) fn metric_values(m: &Metrics, labels: [&str; 2]) -> [(String, String)
     ]
 }
 
-fn metrics(m: &Metrics) -> String {
+fn metrics(m: &Metrics, labels: [&str; 2]) -> String {
     let line = |(key, value)| format!("  {key:<16} {value}\n");
-    metric_values(m, LABELS).into_iter().map(line).collect()
+    metric_values(m, labels).into_iter().map(line).collect()
 }
 
 /// With three digits that count.

@@ -203,8 +203,9 @@ pub(super) struct Block {
     pub variance: f64,
     /// The mean of v around, times the pixels.
     pub around: f64,
-    /// Σ of the mean of both pictures, weighed.
+    /// Σ of the mean of both pictures, weighed; and of those pixels alone that have noise.
     pub light: f64,
+    pub noisy_light: f64,
     /// Degrees of freedom of `variance` and of what is around it too.
     pub dof: [f64; 2],
     /// Unweighed means in A and B.
@@ -247,13 +248,19 @@ fn threshold(p: f64) -> f64 {
     SQRT_2 * erfc_inv((p / BENTKUS).min(1.0))
 }
 
-/// For each block the smallest relative change of all its light that brings the statistic of some channel to
-/// `needed`. A change adds to Σ d² too: of n pixels no statistic exceeds √n.
+/// For each block the smallest relative change of its light that brings the statistic of some channel to `needed`. Light without
+/// noise does not count if there is other light: it comes straight from a lamp, and a change of the scene's reflection leaves it as it
+/// is. A change adds to Σ d² too: of n pixels no statistic exceeds √n.
 fn changes(seen: &mut Vec<f64>, grids: &[Grid], needed: f64) {
     let of = |block: &Block| {
         let room = 1.0 - needed * needed / block.count;
-        if room > 0.0 && block.light > 0.0 {
-            needed * (block.variance / room).sqrt() / block.light
+        let light = if block.noisy_light > 0.0 {
+            block.noisy_light
+        } else {
+            block.light
+        };
+        if room > 0.0 && light > 0.0 {
+            needed * (block.variance / room).sqrt() / light
         } else {
             f64::INFINITY
         }

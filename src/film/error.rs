@@ -20,7 +20,7 @@
 //! independent, and as few as they are uneven: Σ c² / (Σ c)². The means of the pools have the relative variance 1 / carriers, and
 //! count twice; pixels that share a pool share its error. The same holds for Ȳ.
 
-use super::{Film, REPLICATES, replicate_counts};
+use super::{Film, REPLICATES, Reach, replicate_counts};
 use crate::stats::{luminance, percent, percent_to};
 use rayon::prelude::*;
 use std::fmt;
@@ -268,7 +268,7 @@ impl Film {
         pixels
     }
 
-    /// Pixels where paths have met surfaces, but found no light, nor have the pixels around them.
+    /// Pixels where paths have met surfaces beyond the first, but found no light, nor have the pixels around them.
     fn unlit(&self, pixels: &[Light]) -> u64 {
         if self.reached.is_empty() {
             return 0;
@@ -288,7 +288,7 @@ impl Film {
         let dark = |i: &usize| {
             let (x, y) = (i % width, i / width);
             pixels[*i].n > 0.0
-                && self.reached[*i] == 1
+                && self.reached[*i] == Reach::Further as u8
                 && !near(y, height).any(|y| along[y * width + x])
         };
         (0..lit.len()).into_par_iter().filter(dark).count() as u64

@@ -1,7 +1,7 @@
 //! Merges films of different samples, different regions, or both.
 
 use super::coverage::{Coverage, Rect};
-use super::{Film, fold};
+use super::{Film, Reach, fold};
 use std::fmt;
 use std::ops::Range;
 
@@ -88,8 +88,10 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
     if !other.reached.is_empty() {
         for y in other.bounds.y0..other.bounds.y1 {
             for x in other.bounds.x0..other.bounds.x1 {
-                if other.has_reached(x, y) {
-                    into.reach(x, y);
+                match other.reached[other.index(x, y)] {
+                    0 => {}
+                    1 => into.reach(x, y, Reach::Surface),
+                    _ => into.reach(x, y, Reach::Further),
                 }
             }
         }

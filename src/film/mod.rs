@@ -50,9 +50,20 @@ pub struct Film {
     left_out: LeftOut,
     /// The pilots of an adaptive film (`--adaptive`).
     pub pilot: Option<Pilot>,
-    /// 1 for each pixel of which a path has met a surface and gone on to look for light, in the order of `sums`; empty if there is
-    /// none, or if it is not known. A pixel without light is then either a background, or lit by light that is rarely found.
+    /// How far paths of each pixel have got, as a [`Reach`], in the order of `sums`; 0 where they have met nothing. Empty if that is
+    /// so everywhere, or if it is not known.
     reached: Vec<u8>,
+}
+
+/// How far a path has got. A pixel without light whose paths have met nothing is a background. If they have met no second surface
+/// after they scattered, no light but a lamp's own can come, which is sampled. Only further on is there light that may be found rarely.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Reach {
+    /// It has met a surface, and gone on.
+    Surface = 1,
+    /// It has met another surface after it had scattered from one.
+    Further = 2,
 }
 
 /// The estimate of a pixel.
@@ -217,22 +228,22 @@ impl Film {
         self.left_out.add(x, y, samples);
     }
 
-    /// Notes that a path of pixel (x, y) has met a surface and gone on to look for light. Only engines that look for light by chance
-    /// say so: without them (direct light alone, Whitted's integrator), light that no light sample finds is not there.
-    pub fn reach(&mut self, x: u32, y: u32) {
+    /// Notes how far a path of pixel (x, y) has got. Only engines that look for light by chance say so: without them (direct light
+    /// alone, Whitted's integrator), light that no light sample finds is not there.
+    pub fn reach(&mut self, x: u32, y: u32, how: Reach) {
         if self.reached.is_empty() {
             self.reached = vec![0; self.sums.len()];
         }
         let i = self.index(x, y);
-        self.reached[i] = 1;
+        self.reached[i] = self.reached[i].max(how as u8);
     }
 
     /// Whether a path of pixel (x, y) has met a surface and gone on to look for light.
     pub fn has_reached(&self, x: u32, y: u32) -> bool {
-        self.reached.get(self.index(x, y)) == Some(&1)
+        self.reached.get(self.index(x, y)).is_some_and(|r| *r > 0)
     }
 
-    /// 1 for each pixel of which a path has; empty if there is none, or if it is not known.
+    /// What [`reach`](Self::reach) has noted for each pixel, or 0; empty if there is nothing.
     pub(crate) fn reached(&self) -> &[u8] {
         &self.reached
     }

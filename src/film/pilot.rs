@@ -340,7 +340,7 @@ impl Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{REPLICATES, Sums};
+    use crate::film::{REPLICATES, Reach, Sums};
 
     /// A pilot of a picture of 64 x 32 pixels whose tiles from column 32 on have a hundred times the variance.
     fn pilot() -> Pilot {
@@ -395,7 +395,7 @@ mod tests {
             let mut film = Film::new([64, 32], whole, 1);
             film.put_samples(whole, 0..4, (0..64 * 32).map(pixel).collect());
             for y in 0..32 {
-                (0..if met { 64 } else { 32 }).for_each(|x| film.reach(x, y));
+                (0..if met { 64 } else { 32 }).for_each(|x| film.reach(x, y, Reach::Further));
             }
             let mut measured = pilot.measurement();
             measured.take(&film, 4);

@@ -36,7 +36,7 @@ impl Film {
         let height = self.bounds.height() as usize;
         let pixels = self.light();
         let may_share =
-            |i: usize| pixels[i].n >= ENOUGH && pixels[i].carriers() < FEW && self.reached[i] == 1;
+            |i: usize| pixels[i].n >= ENOUGH && pixels[i].carriers() < FEW && self.reached[i] > 0;
         let any = (0..pixels.len())
             .into_par_iter()
             .any(|i| may_share(i) && pixels[i].sum == 0.0);

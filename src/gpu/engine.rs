@@ -500,7 +500,9 @@ impl Engine for GpuEngine {
                     film.leave_out(x, y, samples);
                 }
                 if self.by_chance {
-                    row.reached.iter().for_each(|&(x, y)| film.reach(x, y));
+                    row.reached
+                        .iter()
+                        .for_each(|&(x, y, how)| film.reach(x, y, how));
                 }
             }
             film.put_block(*rect, samples.clone(), |x, y| held[at(x, y)]);

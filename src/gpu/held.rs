@@ -2,7 +2,7 @@
 
 use crate::engine::{Counters, Part};
 use crate::film::coverage::Rect;
-use crate::film::{BLOCK, Film, REPLICATES, Sums};
+use crate::film::{BLOCK, Film, REPLICATES, Reach, Sums};
 use std::ops::Range;
 
 /// Running sums that lie in a tile's textures.
@@ -46,9 +46,12 @@ pub(super) struct CountedRow {
     pub counters: Counters,
     /// Pixels that lost samples, and how many each replicate lost.
     pub lost: Vec<(u32, u32, [u64; REPLICATES])>,
-    /// Pixels of which a path has gone on from a surface.
-    pub reached: Vec<(u32, u32)>,
+    /// Pixels of which a path has gone on from a surface, and how far.
+    pub reached: Vec<(u32, u32, Reach)>,
 }
+
+/// As in `shaders/film.wgsl`.
+const FURTHER: u32 = 0x8000;
 
 /// Unpacks the counters of some pixels, as `PixelFilm` of `shaders/film.wgsl` holds them, for `samples` of one block.
 pub(super) fn count_row(
@@ -65,10 +68,12 @@ pub(super) fn count_row(
     for (x, y, c) in pixels {
         let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
         counters.rays += u64::from(c[0]);
-        if u64::from(c[0]) > samples.end - samples.start {
-            reached.push((x, y));
+        if c[1] & FURTHER != 0 {
+            reached.push((x, y, Reach::Further));
+        } else if u64::from(c[0]) > samples.end - samples.start {
+            reached.push((x, y, Reach::Surface));
         }
-        counters.truncated += half(1, 0);
+        counters.truncated += half(1, 0) & u64::from(FURTHER - 1);
         let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
         if left_out != [0; REPLICATES] {
             lost.push((x, y, left_out));

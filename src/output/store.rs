@@ -20,7 +20,7 @@ use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use crate::film::coverage::{Coverage, Rect};
 use crate::film::pilot::Pilot;
-use crate::film::{BLOCK, Film, REPLICATES, Sums};
+use crate::film::{BLOCK, Film, REPLICATES, Reach, Sums};
 use crate::provenance::Provenance;
 use crate::scene::LARGEST_STRATA;
 use rayon::prelude::*;
@@ -279,8 +279,10 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     };
     let reached = if header.reached {
         let reached: Vec<u8> = reader.array("reached", "|u1", &[height, width], pixels)?;
-        if reached.iter().any(|r| *r > 1) {
-            return Err(Damage::Wrong("\"reached\" holds more than 0 and 1".into()));
+        if reached.iter().any(|r| *r > Reach::Further as u8) {
+            return Err(Damage::Wrong(
+                "\"reached\" holds more than 0, 1 and 2".into(),
+            ));
         }
         reached
     } else {

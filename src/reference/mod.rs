@@ -22,7 +22,7 @@ pub use tracer::Tracer;
 
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::coverage::Rect;
-use crate::film::{Film, REPLICATES, Sums};
+use crate::film::{Film, REPLICATES, Reach, Sums};
 use crate::settings::Settings;
 use crate::stats::luminance;
 use crate::world::World;
@@ -77,6 +77,7 @@ impl CpuEngine {
         let round = self.tracer.settings().round();
         let mut left_out = [0; REPLICATES];
         let mut counters = Counters::default();
+        let mut further = false;
         for sample in samples {
             if stop.load(Ordering::Relaxed) {
                 return None;
@@ -85,6 +86,7 @@ impl CpuEngine {
             counters.paths += 1;
             counters.rays += traced.rays;
             counters.truncated += u64::from(traced.truncated);
+            further |= traced.further;
             let rgb = traced.radiance.to_array();
             let replicate = (sample / round % REPLICATES as u64) as usize;
             if !traced.radiance.is_finite() {
@@ -102,6 +104,7 @@ impl CpuEngine {
             sums,
             left_out,
             counters,
+            further,
         })
     }
 }
@@ -111,6 +114,8 @@ struct Pixel {
     sums: [Sums<f64>; REPLICATES],
     left_out: [u64; REPLICATES],
     counters: Counters,
+    /// As [`Reach::Further`].
+    further: bool,
 }
 
 impl Engine for CpuEngine {
@@ -144,8 +149,10 @@ impl Engine for CpuEngine {
             for (k, pixel) in (0..).zip(pixels) {
                 let (x, y) = (rect.x0 + k % rect.width(), rect.y0 + k / rect.width());
                 film.leave_out(x, y, pixel.left_out);
-                if by_chance && pixel.counters.rays > pixel.counters.paths {
-                    film.reach(x, y);
+                if by_chance && pixel.further {
+                    film.reach(x, y, Reach::Further);
+                } else if by_chance && pixel.counters.rays > pixel.counters.paths {
+                    film.reach(x, y, Reach::Surface);
                 }
                 total += pixel.counters;
             }

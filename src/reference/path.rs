@@ -29,6 +29,8 @@ pub struct Traced {
     pub rays: u64,
     /// Whether the path was cut at the depth limit.
     pub truncated: bool,
+    /// Whether it met a surface after it had scattered into more than one direction.
+    pub further: bool,
 }
 
 /// How a path continues from a surface.
@@ -71,6 +73,7 @@ impl Tracer {
         // Radiance over n² is constant along a path. This factor is kept apart from the throughput, because roulette must not see it.
         let mut index_ratio = 1.0;
         let mut chosen: Option<Chosen> = None;
+        let mut all_specular = true;
         for vertex in 1..=self.settings.max_depth {
             rng.start_vertex(vertex);
             let u = [(); 4].map(|()| rng.uniform());
@@ -91,6 +94,7 @@ impl Tracer {
                     break;
                 }
             };
+            traced.further |= !all_specular;
             let only_lights_count =
                 self.settings.integrator == Integrator::Whitted && chosen.is_some();
             if only_lights_count || !self.wants_more(vertex) {
@@ -124,6 +128,7 @@ impl Tracer {
             if vertex == self.settings.max_depth {
                 traced.truncated = true;
             }
+            all_specular &= scattered.pdf.is_none();
             chosen = scattered.pdf.map(|pdf| Chosen {
                 point: hit.point,
                 pdf,

@@ -58,7 +58,7 @@ impl Wanted {
 }
 
 /// The properties of a golden.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Bless {
     /// Width and height in pixels.
     pub size: [u32; 2],
@@ -70,6 +70,8 @@ pub struct Bless {
     pub short: bool,
     /// Bytes of the file.
     pub bytes: u64,
+    /// Why the golden that was there before was not kept.
+    pub replaced: Option<String>,
 }
 
 impl fmt::Display for Bless {
@@ -79,12 +81,17 @@ impl fmt::Display for Bless {
         let s = if samples == 1 { "" } else { "s" };
         write!(f, "{w}x{h}, {samples} sample{s} per pixel, {bytes} bytes; ")?;
         if self.power >= 1.0 {
-            return f.write_str("too noisy to detect a change of the whole picture's brightness");
+            f.write_str("too noisy to detect a change of the whole picture's brightness")?;
+        } else {
+            write!(
+                f,
+                "detects a change of the whole picture's brightness by {power:.2} %"
+            )?;
         }
-        write!(
-            f,
-            "detects a change of the whole picture's brightness by {power:.2} %"
-        )
+        match &self.replaced {
+            Some(why) => write!(f, "; the golden before it: {why}"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -170,6 +177,7 @@ pub(super) fn bless(
         power,
         short: power > wanted.power(),
         bytes: bytes.len(),
+        replaced: None,
     }))
 }
 
@@ -280,6 +288,19 @@ impl Facts {
             light,
             integrator,
         })
+    }
+
+    /// Refuses a golden of paths of another length than the scene's: its light differs. Size, strata and seed do not change the light,
+    /// and are the golden's.
+    pub fn check_settings(&self, scene: &Scene, hint: &str) -> Result<(), String> {
+        let now = Settings::resolve(scene, &Overrides::default()).max_depth;
+        if now == self.max_depth {
+            return Ok(());
+        }
+        Err(format!(
+            "the golden has max_depth {}, but the scene has {now}; if the change is intended, re-create the golden with {hint}",
+            self.max_depth
+        ))
     }
 
     /// The golden's settings with another seed: with the same seed both would have the same noise.

@@ -175,6 +175,17 @@ impl Case {
         self.beside("report.html")
     }
 
+    /// The flags that re-create its golden, for a shell.
+    pub fn hint(&self) -> String {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+        let name = &self.name;
+        if name.chars().all(plain) {
+            format!("--bless --scene {name}")
+        } else {
+            format!("--bless --scene '{}'", name.replace('\'', "'\\''"))
+        }
+    }
+
     fn beside(&self, ending: &str) -> PathBuf {
         self.dir
             .join("golden")
@@ -223,22 +234,32 @@ impl Case {
         limits: &Limits,
         stop: &AtomicBool,
     ) -> Option<(Outcome, Option<[Picture; 2]>)> {
-        let there = self.golden.then(|| Picture::read(&self.golden_path()));
-        if there.is_some_and(|g| g.is_ok_and(|g| wanted.met_by(&g))) {
-            match self.judge(engine, limits, stop) {
+        let replaced = match self.golden.then(|| Picture::read(&self.golden_path())) {
+            None => None,
+            Some(Err(e)) => Some(text(e)),
+            Some(Ok(golden)) if !wanted.met_by(&golden) => {
+                Some("it has another size, or other samples than asked for".into())
+            }
+            Some(Ok(_)) => match self.judge(engine, limits, stop) {
                 Ok(None) => return None,
                 Ok(Some(judged)) if judged.comparison.same() => {
                     self.clear();
                     let outcome = Outcome::Kept(Box::new(judged.comparison));
                     return Some((outcome, Some(judged.pictures)));
                 }
-                // It differs, or it is of no use.
-                Ok(Some(_)) | Err(Trouble::Input(_)) => {}
+                Ok(Some(judged)) => Some(judged.comparison.sentence()),
+                Err(Trouble::Input(why)) => Some(why),
                 Err(trouble) => return Some((trouble.into(), None)),
-            }
-        }
+            },
+        };
         match golden::bless(self, engine, wanted, stop) {
-            Ok(blessed) => Some((Outcome::Blessed(blessed?), None)),
+            Ok(blessed) => {
+                let blessed = Bless {
+                    replaced,
+                    ..blessed?
+                };
+                Some((Outcome::Blessed(blessed), None))
+            }
             Err(trouble) => Some((trouble.into(), None)),
         }
     }
@@ -254,16 +275,17 @@ impl Case {
         let source = parse::read_text(&self.scene_path()).map_err(text)?;
         let scene = parse::parse_str(&self.scene_path(), &source)
             .map_err(|e| parse::ReadError::Invalid(e).to_string())?;
+        facts.check_settings(&scene, &self.hint())?;
         let settings = facts.settings(&scene);
         let mut provenance = Provenance::new(&scene, source, &settings);
         if provenance.scene_hash != facts.scene_hash {
             return Err(format!(
-                "{} is of another scene than {} (hash {} and {}); if the change is intended, re-create the golden with \
-                 --bless",
+                "{} is of another scene than {} (hash {} and {}); if the change is intended, re-create the golden with {}",
                 self.golden_path().display(),
                 self.scene_path().display(),
                 short(&facts.scene_hash),
-                short(&provenance.scene_hash)
+                short(&provenance.scene_hash),
+                self.hint()
             )
             .into());
         }
@@ -284,7 +306,8 @@ impl Case {
         }
         let name = self.scene_path().display().to_string();
         let actual = Picture::from_film(name, &film, &provenance)?;
-        let comparison = compare(&golden, &actual, limits).map_err(text)?;
+        let mut comparison = compare(&golden, &actual, limits).map_err(text)?;
+        comparison.labels = LABELS;
         Ok(Some(Judged {
             pictures: [golden, actual],
             comparison,

@@ -22,13 +22,26 @@ pub struct Done {
     pub time: Duration,
 }
 
-/// The scenes that were left out.
-#[derive(Debug, Clone, Copy)]
-pub struct Filter<'a> {
-    /// `--filter`.
-    pub text: &'a str,
-    /// How many scenes there are without it.
+/// Which scenes were chosen.
+#[derive(Debug, Clone)]
+pub struct Filter {
+    /// The flags that chose them.
+    pub flags: String,
+    /// How many scenes there are without them.
     pub of: usize,
+}
+
+impl Filter {
+    /// `--filter` and `--scene`; none if they choose all.
+    pub fn of(text: Option<&str>, scenes: &[String], of: usize) -> Option<Self> {
+        let text = text.iter().map(|text| format!("--filter {text}"));
+        let scenes = scenes.iter().map(|name| format!("--scene {name}"));
+        let flags: Vec<String> = text.chain(scenes).collect();
+        (!flags.is_empty()).then(|| Self {
+            flags: flags.join(" "),
+            of,
+        })
+    }
 }
 
 /// What a page says about the run.
@@ -41,7 +54,7 @@ pub struct About {
 }
 
 /// The last line of a list: how many of each.
-pub fn summary(done: &[Done], filter: Option<Filter>) -> String {
+pub fn summary(done: &[Done], filter: Option<&Filter>) -> String {
     let words = [
         "passed",
         "FAILED",
@@ -60,16 +73,14 @@ pub fn summary(done: &[Done], filter: Option<Filter>) -> String {
         .collect();
     let scenes = |n: usize| format!("{n} scene{}", if n == 1 { "" } else { "s" });
     let which = match filter {
-        Some(Filter { text, of }) => {
-            format!("{} of {} (--filter {text})", done.len(), scenes(of))
-        }
+        Some(Filter { flags, of }) => format!("{} of {} ({flags})", done.len(), scenes(*of)),
         None => scenes(done.len()),
     };
     format!("{which}: {}", told.join(", "))
 }
 
 /// JUnit XML: a failure for what differs or is new or orphaned, an error for what could not be compared.
-pub fn junit(done: &[Done]) -> String {
+pub fn junit(done: &[Done], about: &About) -> String {
     let errors = done.iter().filter(|d| unusable(d)).count();
     let failures = done.iter().filter(|d| !d.outcome.good()).count() - errors;
     let time: f64 = done.iter().map(|d| d.time.as_secs_f64()).sum();
@@ -79,14 +90,28 @@ pub fn junit(done: &[Done]) -> String {
     );
     let mut xml = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let _ = writeln!(xml, "<testsuites {counts}>");
-    let _ = writeln!(xml, "<testsuite name=\"etendue regress\" {counts}>");
+    let _ = writeln!(
+        xml,
+        "<testsuite name=\"etendue regress\" {counts} timestamp=\"{}\">",
+        utc(about.time).replace(' ', "T").replace("TUTC", ":00Z")
+    );
+    let adapter = format!("{}, {}", about.device.name, about.device.driver);
+    let _ = writeln!(xml, "<properties>");
+    for (name, value) in [
+        ("etendue", env!("CARGO_PKG_VERSION")),
+        ("adapter", &adapter),
+    ] {
+        let value = xml_text(value);
+        let _ = writeln!(xml, "<property name=\"{name}\" value=\"{value}\"/>");
+    }
+    let _ = writeln!(xml, "</properties>");
     for d in done {
         let detail = xml_text(&d.outcome.detail(&d.case));
         let _ = writeln!(
             xml,
             "<testcase name=\"{}\" classname=\"{}\" time=\"{:.3}\">",
             xml_text(&d.case.name),
-            xml_text(&d.case.dir.display().to_string()),
+            xml_text(&folder(&d.case.dir)),
             d.time.as_secs_f64()
         );
         if d.outcome.good() {
@@ -95,8 +120,14 @@ pub fn junit(done: &[Done]) -> String {
             let element = if unusable(d) { "error" } else { "failure" };
             let kind = d.outcome.word().to_lowercase();
             let text = match &d.outcome {
-                Outcome::Failed { comparison, .. } => xml_text(&comparison.report()),
-                _ => String::new(),
+                Outcome::Failed {
+                    comparison,
+                    unsaved,
+                } => {
+                    let advice = advice(&d.case, unsaved.as_deref());
+                    xml_text(&format!("{}\n{advice}\n", comparison.report()))
+                }
+                _ => detail.clone(),
             };
             let _ = writeln!(
                 xml,
@@ -106,6 +137,27 @@ pub fn junit(done: &[Done]) -> String {
         xml += "</testcase>\n";
     }
     xml + "</testsuite>\n</testsuites>\n"
+}
+
+/// Where the evidence of a failure is, and what to type if the change is intended.
+pub fn advice(case: &Case, unsaved: Option<&str>) -> String {
+    let evidence = match unsaved {
+        None => format!(
+            "see {} and {}",
+            case.report_path().display(),
+            case.actual_path().display()
+        ),
+        Some(why) => format!("its film and page could not be saved: {why}"),
+    };
+    let flags = case.hint();
+    format!("{evidence}; if the change is intended, re-create the golden with {flags}")
+}
+
+/// The name of a folder, whatever path leads to it.
+fn folder(dir: &Path) -> String {
+    let real = dir.canonicalize();
+    let name = real.as_deref().unwrap_or(dir).file_name();
+    name.unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn unusable(done: &Done) -> bool {
@@ -119,7 +171,7 @@ fn xml_text(text: &str) -> String {
 }
 
 /// One page with all cases, failures first; it links the reports of failures by their paths from `base`, the page's folder.
-pub fn index(done: &[Done], filter: Option<Filter>, about: &About, base: &Path) -> String {
+pub fn index(done: &[Done], filter: Option<&Filter>, about: &About, base: &Path) -> String {
     let mut ordered: Vec<&Done> = done.iter().collect();
     ordered.sort_by_key(|d| d.outcome.good());
     let mut rows = String::new();

@@ -59,11 +59,14 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
 pub fn lints(scene: &Scene, on_gpu: Option<[u32; 2]>) -> Lints {
     let mut picture = vec![eye::warnings(scene)];
     picture.extend(on_gpu.map(|size| far::warnings(scene, size)));
-    let mut remarks = vec![
-        materials(scene),
-        lights::black(scene),
-        open::warnings(scene),
-    ];
+    let mut remarks = vec![materials(scene), open::warnings(scene)];
+    // One light that is off may be meant.
+    let off = if scene.lights.iter().all(|l| l.radiance == DVec3::ZERO) {
+        &mut picture
+    } else {
+        &mut remarks
+    };
+    off.push(lights::black(scene));
     let things = scene.primitives.len() + scene.lights.len();
     if things <= MAX_PAIRWISE {
         picture.push(coincide::warnings(scene));

@@ -252,11 +252,14 @@ fn source_name(name: &str) -> String {
 /// The primitives in the order of [`Scene::primitives`].
 fn primitives(file: &mut Reader, materials: &[Named]) -> Vec<Option<Primitive>> {
     let mut primitives = Vec::new();
+    let misnamed = materials.is_empty() && file.table.contains_key("materials");
     for kind in ShapeKind::ALL {
         primitives.extend(file.each(kind.name(), |t, place| {
             let (shape, name) = format::primitive(t, kind)?;
             let material = match find(&name, materials) {
                 Ok(material) => material,
+                // That there are none is one error, of the table that has another name.
+                Err(_) if misnamed => return None,
                 Err(message) => {
                     t.refuse("material", message);
                     return None;

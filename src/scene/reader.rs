@@ -220,8 +220,12 @@ impl<'a, 't> Reader<'a, 't> {
             .filter(|k| !self.known.contains(&k.get_ref().as_ref()))
         {
             let word = key.get_ref().as_ref();
+            let place = match word {
+                "title" => "; a title stands at the top of the file, before the first [table]",
+                _ => "",
+            };
             let message = format!(
-                "unknown key {} in {}; allowed: {}{}{}",
+                "unknown key {} in {}; allowed: {}{}{}{place}",
                 quoted(word),
                 self.what,
                 self.known.join(", "),

@@ -183,7 +183,33 @@ impl Faults {
     }
 }
 
-/// `; did you mean "…"?` for the candidate most like `word`, if any is.
+/// What other programs, and the literature, call things.
+const SYNONYMS: [(&str, &str); 22] = [
+    ("color", "reflectance"),
+    ("colour", "reflectance"),
+    ("albedo", "reflectance"),
+    ("position", "center"),
+    ("origin", "eye"),
+    ("diameter", "radius"),
+    ("emission", "radiance"),
+    ("intensity", "radiance"),
+    ("shininess", "exponent"),
+    ("n", "exponent"),
+    ("kd", "diffuse"),
+    ("ks", "specular"),
+    ("eta", "ior"),
+    ("fov", "vfov"),
+    ("target", "look_at"),
+    ("size", "resolution"),
+    ("glass", "dielectric"),
+    ("lambert", "diffuse"),
+    ("lambertian", "diffuse"),
+    ("matte", "diffuse"),
+    ("glossy", "phong"),
+    ("tube", "cylinder"),
+];
+
+/// `; did you mean "…"?` for a synonym of `word`, or for the candidate most like it, if any is.
 pub(super) fn suggestion<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) -> String {
     /// Share of letters that must agree: 0.6 takes one slip in three letters, two in five.
     const ALIKE: f64 = 0.6;
@@ -192,6 +218,13 @@ pub(super) fn suggestion<'c>(word: &str, candidates: impl IntoIterator<Item = &'
         return String::new();
     }
     let word = word.to_lowercase();
+    let candidates: Vec<&str> = candidates.into_iter().collect();
+    let synonym = SYNONYMS
+        .into_iter()
+        .find(|(other, meant)| *other == word && candidates.contains(meant));
+    if let Some((_, meant)) = synonym {
+        return format!("; did you mean {}?", quoted(meant));
+    }
     // Of the letters that were written: two that are missing after three are no slip.
     let letters = word.chars().count() as f64;
     candidates
@@ -240,6 +273,8 @@ mod tests {
         assert_eq!(suggestion("foo", ["floor"]), "");
         assert_eq!(suggestion("discs", ["disk"]), "; did you mean \"disk\"?");
         assert_eq!(suggestion("", keys), "");
+        assert_eq!(suggestion("Position", keys), "; did you mean \"center\"?");
+        assert_eq!(suggestion("color", keys), "");
         assert_eq!(suggestion(&"radius".repeat(50), keys), "");
     }
 }

@@ -41,6 +41,15 @@ pub(super) fn tables<'a>(source: &Source<'a>, faults: &mut Faults) -> Option<DeT
             }
             continue;
         }
+        if let Some(at) = unclosed(text, error.message(), &span) {
+            // What follows is taken for a part of the list: its errors are none.
+            let bracket = source.quote(at..at + 1);
+            faults.push(
+                Some(at),
+                format!("not TOML: this `{bracket}` is not closed"),
+            );
+            break;
+        }
         let this = source.table_place(span.start).line;
         if this != line {
             let (at, message) = syntax(source, error.message(), span);
@@ -64,10 +73,74 @@ fn syntax(source: &Source, message: &str, span: Range<usize>) -> (usize, String)
     let message = match message {
         // The parser treats anything that is not another value as a string.
         _ if found.is_empty() && is_unquoted(message) => "not TOML: a value is missing".into(),
-        _ if found.is_empty() => format!("not TOML: {message}"),
-        _ => format!("not TOML: {message}; found `{found}`"),
+        _ if found.is_empty() => {
+            format!("not TOML: {message}{}", hint(source.text(), message, &span))
+        }
+        // A number was meant as often as a text.
+        _ if is_unquoted(message) => format!(
+            "not TOML: expected a number, a list, or a text in quotes; found `{found}`{}",
+            hint(source.text(), message, &span)
+        ),
+        _ => format!(
+            "not TOML: {message}; found `{found}`{}",
+            hint(source.text(), message, &span)
+        ),
     };
     (span.start, message)
+}
+
+/// Where the bracket stands that a list or an inline table lacks the other of, if that is the error: the parser takes the next line for
+/// another value.
+fn unclosed(text: &str, message: &str, span: &Range<usize>) -> Option<usize> {
+    let missing = message.starts_with("missing comma") || message.starts_with("unclosed");
+    let ends = missing || is_unquoted(message);
+    let at = open_bracket(&text[..span.start]).filter(|_| ends)?;
+    let line = text[span.start..].lines().next().unwrap_or_default();
+    let before = text[at..span.start].rsplit_once('\n');
+    let is_new = before.is_some_and(|(_, blank)| blank.trim().is_empty());
+    let is_next = line.trim_start().starts_with('[') || line.contains('=');
+    let is_end = text[span.start..].trim().is_empty();
+    (is_end || (is_new && is_next)).then_some(at)
+}
+
+/// The last bracket that is open at the end of `text`, outside of texts and comments.
+fn open_bracket(text: &str) -> Option<usize> {
+    let mut open = Vec::new();
+    let mut within: Option<char> = None;
+    for (at, c) in text.char_indices() {
+        match within {
+            Some('#') if c == '\n' => within = None,
+            Some(quote) if quote != '#' && (c == quote || c == '\n') => within = None,
+            Some(_) => {}
+            None if matches!(c, '#' | '"' | '\'') => within = Some(c),
+            None if matches!(c, '[' | '{') => open.push(at),
+            None if matches!(c, ']' | '}') => {
+                open.pop();
+            }
+            None => {}
+        }
+    }
+    open.pop()
+}
+
+/// What someone may have meant who wrote this where a value stands.
+fn hint(text: &str, message: &str, span: &Range<usize>) -> &'static str {
+    let found = text.get(span.clone()).unwrap_or_default().trim();
+    if text[span.start..].starts_with(',') {
+        return "; decimals have a point, and only lists have commas";
+    }
+    if !is_unquoted(message) {
+        return "";
+    }
+    if found.starts_with('(') {
+        "; lists stand in brackets: [1.0, 2.0]"
+    } else if found.ends_with(';') {
+        "; lines end without a semicolon"
+    } else if found.starts_with(['\u{201c}', '\u{201d}', '\u{2018}', '\u{2019}']) {
+        "; texts have straight quotes"
+    } else {
+        ""
+    }
 }
 
 fn is_unquoted(message: &str) -> bool {

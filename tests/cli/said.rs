@@ -136,7 +136,8 @@ fn a_scene_in_place_of_a_command_suggests_render() {
             .run(&format!("{scene} --spp 4"))
             .code(2)
             .stdout("")
-            .stderr(says(&format!("to render a scene: etendue render {scene}")));
+            .stderr(says(&format!("to render a scene: etendue render {scene}")))
+            .stderr(says("similar").not());
     }
     bench
         .run("rendr")
@@ -436,4 +437,51 @@ fn a_black_picture_of_a_lit_scene_states_no_error() {
         let header = bench.picture("a.exr").attributes;
         assert_eq!(header.contains_key("relative_error"), error.is_some());
     }
+}
+
+#[test]
+fn an_error_that_was_not_reached_is_said() {
+    let bench = Bench::new();
+    bench
+        .run("render box.toml --backend cpu --spp 8 --error 1% -o a.png")
+        .success()
+        .stderr(says("; not yet 1.00 % with certainty"));
+    bench
+        .run("render box.toml --backend cpu --spp 8 -o a.png")
+        .success()
+        .stderr(says("with certainty").not());
+}
+
+#[test]
+fn a_white_or_black_png_comes_with_an_exposure() {
+    let bench = Bench::new();
+    for (radiance, said) in [
+        ("60000.0", "are white in the PNG; try --exposure -1"),
+        ("0.0001", "are black in the PNG; try --exposure +1"),
+    ] {
+        let scene = SCENE.replace("8.0, 8.0, 8.0", &[radiance; 3].join(", "));
+        fs::write(bench.path("lit.toml"), scene).unwrap();
+        bench
+            .run("render lit.toml --backend cpu --spp 8 -o a.png")
+            .success()
+            .stderr(says(said));
+    }
+    bench
+        .run("render box.toml --backend cpu --spp 8 -o a.png")
+        .success()
+        .stderr(says("--exposure").not());
+}
+
+#[test]
+fn lights_that_are_all_off_are_said() {
+    let bench = Bench::new();
+    fs::write(
+        bench.path("off.toml"),
+        SCENE.replace("8.0, 8.0, 8.0", "0, 0, 0"),
+    )
+    .unwrap();
+    bench
+        .run("render off.toml --backend cpu --spp 2 -q -o a.png")
+        .success()
+        .stderr(says("warning: ").and(says("has radiance 0, so it is a black disk")));
 }

@@ -257,6 +257,67 @@ fn a_missing_comma_is_named() {
 }
 
 #[test]
+fn a_bracket_that_is_not_closed_is_one_error() {
+    for (old, new, error) in [
+        (
+            "[0.0, 1.0, 3.8]",
+            "[0.0, 1.0, 3.8",
+            "4:7: not TOML: this `[` is not closed",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "[0.0, # ] no\n1.0, 3.8",
+            "4:7: not TOML: this `[` is not closed",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "[[0.0, 1.0], 3.8",
+            "4:7: not TOML: this `[` is not closed",
+        ),
+    ] {
+        one(old, new, error);
+    }
+}
+
+#[test]
+fn what_was_meant_is_said() {
+    for (old, new, hint) in [
+        ("vfov = 42", "vfov = 42;", "lines end without a semicolon"),
+        ("vfov = 42", "vfov = 42,5", "decimals have a point"),
+        ("vfov = 42", "vfov = 42,", "only lists have commas"),
+        (
+            "vfov = 42",
+            "vfov = 90/2",
+            "expected a number, a list, or a text in quotes; found `90/2`",
+        ),
+        (
+            "[0.0, 1.0, 3.8]",
+            "(0.0, 1.0, 3.8)",
+            "lists stand in brackets",
+        ),
+        ("vfov = 42", "fov = 42", "did you mean \"vfov\"?"),
+        (
+            "type = \"dielectric\"",
+            "type = \"glass\"",
+            "did you mean \"dielectric\"?",
+        ),
+        (
+            "vfov = 42",
+            "vfov = 42\ntitle = \"x\"",
+            "a title stands at the top of the file",
+        ),
+    ] {
+        let found = errors(old, new);
+        assert!(found.iter().any(|e| e.contains(hint)), "{new}: {found:?}");
+    }
+    // The table has another name: its materials are missing nowhere.
+    let text = FULL.replace("[material.", "[materials.");
+    let found = parse(&text).expect_err("no materials");
+    assert!(found[0].contains("did you mean \"material\"?"), "{found:?}");
+    assert_eq!(found.len(), 1, "{found:?}");
+}
+
+#[test]
 fn independent_errors_are_all_reported_in_file_order() {
     let text = FULL
         .replace("vfov = 42", "vfov = 420")

@@ -18,7 +18,7 @@ Examples:
   etendue compare before.exr after.npz --html report.html
   etendue compare before.png after.png --max-flip 0.05
 
-Exit status: 0 equal, 1 different, 2 not comparable.")]
+Exit status: 0 equal, 1 different, 2 not comparable, 4 a file can't be read or written.")]
 pub struct CompareArgs {
     /// Reference picture: .exr, .png, or .npz (a film)
     pub a: PathBuf,
@@ -58,7 +58,8 @@ Examples:
   etendue regress scenes --filter glass
 
 Exit status: 0 all passed; 1 one failed, or a scene or its golden is missing; 2 one can't be compared (the scene has errors, \
-or its golden is damaged or of another scene), or there is nothing to compare; 3 no usable adapter, or the device failed.")]
+or its golden is damaged or of another scene), or there is nothing to compare; 3 no usable adapter, or the device failed; 4 the \
+folder can't be read, or the results can't be written; 130, 143 or 129 interrupted, after telling the results so far.")]
 pub struct RegressArgs {
     /// Folder with the scenes
     pub dir: PathBuf,
@@ -68,6 +69,9 @@ pub struct RegressArgs {
     /// Run only scenes whose name contains TEXT
     #[arg(long, value_name = "TEXT")]
     pub filter: Option<String>,
+    /// Run only the scene of this name. Repeatable
+    #[arg(long, value_name = "NAME", conflicts_with = "filter")]
+    pub scene: Vec<String>,
     /// Number of scenes rendered at the same time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = values::whole::<u16>(1, 256),
           allow_hyphen_values = true)]

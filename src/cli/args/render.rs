@@ -80,8 +80,8 @@ pub struct RenderArgs {
     pub samples: Option<Range<u64>>,
 
     /// Take more samples where the error is larger. --spp and --rays then set the mean over the pixels. Pilot samples, which
-    /// are not part of the picture, measure the error; they cost 1/8 of the time at 32 samples per pixel, 1/32 at 128. An
-    /// adaptive film can only be resumed with --adaptive
+    /// are not part of the picture, measure the error; they cost 1/8 of the time at 32 samples per pixel, 1/32 at 128. They
+    /// pay where noise is uneven, as beside caustics. An adaptive film is resumed adaptively
     #[arg(long, conflicts_with = "samples", help_heading = "What to render")]
     pub adaptive: bool,
     /// Width and height in pixels instead of the scene's

@@ -80,7 +80,7 @@ fn stated(source: impl Fn(u32, u32) -> Source) -> [f64; 4] {
         let mut film = simulated(&source, seed);
         let met = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
         met.filter(|&(x, y)| source(x, y).mean() > 0.0)
-            .for_each(|(x, y)| film.reach(x, y));
+            .for_each(|(x, y)| film.reach(x, y, Reach::Further));
         film.relative_error()
     });
     let errors: Vec<RelativeError> = films.filter(|e| e.value.is_some()).collect();
@@ -207,7 +207,7 @@ fn surfaces_that_no_light_was_found_on_are_told_from_a_background() {
     assert_eq!(film.relative_error(), RelativeError::ZERO);
     for y in 0..SIZE[1] {
         for x in 0..24 {
-            film.reach(x, y);
+            film.reach(x, y, Reach::Further);
         }
     }
     // 24 columns but for the corner and what is within four pixels of it.
@@ -258,7 +258,7 @@ fn pixels_without_light_share_the_error_of_those_that_found_some() {
     assert_eq!(film.shared_errors(), None, "nothing is known of surfaces");
     for y in 0..SIZE[1] {
         for x in 0..24 {
-            film.reach(x, y);
+            film.reach(x, y, Reach::Further);
         }
     }
     let shared = film.shared_errors().unwrap();
@@ -294,7 +294,7 @@ fn pixels_with_light_keep_their_own_errors() {
     };
     let mut film = simulated(source, 1);
     for y in 0..SIZE[1] {
-        (0..SIZE[0]).for_each(|x| film.reach(x, y));
+        (0..SIZE[0]).for_each(|x| film.reach(x, y, Reach::Further));
     }
     assert_eq!(film.shared_errors(), None);
 }
