@@ -105,7 +105,13 @@ impl DeviceInfo {
 
     /// Whether samples have the same bits on both devices. The CPU reference's number of threads does not matter.
     pub fn rounds_like(&self, other: &Self) -> bool {
-        (&self.name, &self.backend) == (&other.name, &other.backend)
+        // llvmpipe names the width of its vectors, which changes no bit.
+        fn name(device: &DeviceInfo) -> &str {
+            let width = device.name.rsplit_once(", ");
+            let width = width.filter(|(_, rest)| rest.ends_with(" bits)"));
+            width.map_or(&device.name, |(name, _)| name)
+        }
+        (name(self), &self.backend) == (name(other), &other.backend)
             && (self.backend == "cpu" || self.driver == other.driver)
     }
 }
@@ -191,5 +197,19 @@ mod tests {
             };
             assert_eq!(device.brief(), brief);
         }
+    }
+
+    #[test]
+    fn the_width_of_vectors_changes_no_bit() {
+        let device = |name: &str, driver: &str| DeviceInfo {
+            name: name.into(),
+            driver: driver.into(),
+            backend: "gpu".into(),
+            software: true,
+        };
+        let wide = device("llvmpipe (LLVM 15.0.6, 512 bits)", "Mesa 22.3.6");
+        assert!(wide.rounds_like(&device("llvmpipe (LLVM 15.0.6, 256 bits)", "Mesa 22.3.6")));
+        assert!(!wide.rounds_like(&device("llvmpipe (LLVM 15.0.7, 512 bits)", "Mesa 22.3.6")));
+        assert!(!wide.rounds_like(&device("llvmpipe (LLVM 15.0.6, 512 bits)", "Mesa 22.3.7")));
     }
 }

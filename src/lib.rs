@@ -8,7 +8,7 @@
 //!
 //! fn main() -> Result<(), etendue::Error> {
 //!     let scene = Scene::read("scenes/three_materials.toml")?;
-//!     let picture = etendue::render(&scene, &Options { error: Some(0.05), ..Options::default() })?;
+//!     let picture = etendue::render(&scene, &Options { error: Some(0.2), ..Options::default() })?;
 //!     println!("{:?} samples a pixel", picture.provenance().samples);
 //!     picture.save("picture.exr")
 //! }
@@ -41,7 +41,8 @@ pub use film::{Estimate, Film};
 pub use glam::DVec3;
 pub use provenance::{DeviceUse, Provenance};
 pub use render::{
-    Backend, DEFAULT_SPP, Error, MAX_SAMPLES, Options, Picture, Progress, render, render_with,
+    Backend, CPU_TIME, DEFAULT_SPP, Error, MAX_SAMPLES, Options, Picture, Progress, render,
+    render_with,
 };
 pub use run::StopReason;
 pub use scene::{Scene, SceneBuilder};

@@ -25,7 +25,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
 /// Size and samples of the pictures that show whether a light reaches the eye.
 const SIZE: [u32; 2] = [32, 24];
 const SAMPLES: u64 = 16;
-const PATHS: u64 = SIZE[0] as u64 * SIZE[1] as u64 * SAMPLES;
+pub(super) const PATHS: u64 = SIZE[0] as u64 * SIZE[1] as u64 * SAMPLES;
 
 /// Scenes with more pairs of a light and a surface are not tried: a ray of the reference meets every surface, and each light has a
 /// picture of its own.
@@ -33,7 +33,7 @@ const MOST_PAIRS: usize = 1000;
 
 /// Where the lights stand that a small picture shows nothing of. Lights that emit nothing, or are known to be hidden, have another
 /// warning.
-fn idle_lights(scene: &Scene) -> Vec<Place> {
+pub(super) fn idle_lights(scene: &Scene) -> Vec<Place> {
     if scene.lights.len() * (scene.primitives.len() + 1) > MOST_PAIRS {
         return Vec::new();
     }

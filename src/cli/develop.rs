@@ -4,6 +4,7 @@ use super::args::DevelopArgs;
 use super::failure::Failure;
 use super::files::{Files, Written};
 use super::progress::Progress;
+use super::render::warn_of_doubt;
 use crate::output::Format;
 use crate::output::store;
 
@@ -34,5 +35,6 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     if let Some(list) = written.list().filter(|_| !args.talk.quiet) {
         progress.say(&format!("wrote {list}"));
     }
+    warn_of_doubt(&provenance.error(&film));
     written.end()
 }

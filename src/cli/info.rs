@@ -3,7 +3,8 @@
 use super::args::InfoArgs;
 use super::failure::Failure;
 use crate::film::coverage::Rect;
-use crate::output::{Kind, entries, read_exr_header, read_png_header, store};
+use crate::output::{Kind, entries, read_exr, read_exr_header, read_png, read_png_header, store};
+use crate::stats::percent;
 use serde::Serialize;
 use std::path::Path;
 
@@ -32,6 +33,8 @@ struct FilmInfo {
     region: Rect,
     /// Rectangles of pixels, and the sample numbers that each has, such as `0..256`.
     coverage: Vec<(String, String)>,
+    /// Share of the region's pixels that have samples.
+    covered: f64,
     /// Whether `--adaptive` chose the numbers of samples.
     adaptive: bool,
     /// The text of the scene file.
@@ -66,6 +69,7 @@ fn of_film(path: &Path) -> Result<Info, Failure> {
         each.collect::<Vec<_>>().join(", ")
     };
     let cells = film.coverage.cells();
+    let area: u64 = film.coverage.cells().map(|(r, _)| r.area()).sum();
     let entries = entries(&provenance).into_iter();
     Ok(Info {
         file: path.display().to_string(),
@@ -74,6 +78,7 @@ fn of_film(path: &Path) -> Result<Info, Failure> {
         film: Some(FilmInfo {
             region: film.bounds,
             coverage: cells.map(|(r, s)| (r.to_string(), ranges(s))).collect(),
+            covered: area as f64 / film.bounds.area() as f64,
             adaptive: film.pilot.is_some(),
             scene_text: provenance.scene_text.clone(),
         }),
@@ -86,6 +91,11 @@ fn of_film(path: &Path) -> Result<Info, Failure> {
 
 fn of_exr(path: &Path) -> Result<Info, Failure> {
     let header = read_exr_header(path)?;
+    // What has colours is read whole, so that damage is found.
+    let has = |name: &str| header.channels.iter().any(|c| c.starts_with(name));
+    if ["R (", "G (", "B ("].into_iter().all(has) {
+        read_exr(path)?;
+    }
     Ok(Info {
         file: path.display().to_string(),
         kind: "EXR picture",
@@ -98,6 +108,7 @@ fn of_exr(path: &Path) -> Result<Info, Failure> {
 
 fn of_png(path: &Path) -> Result<Info, Failure> {
     let header = read_png_header(path)?;
+    read_png(path)?;
     Ok(Info {
         file: path.display().to_string(),
         kind: "PNG picture",
@@ -138,6 +149,9 @@ impl Info {
                         );
                     }
                 }
+            }
+            if film.covered < 1.0 {
+                line("pixels with samples", &percent(film.covered));
             }
             if film.adaptive {
                 line("adaptive", "yes");

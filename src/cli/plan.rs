@@ -8,13 +8,13 @@ use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
 use crate::render::plan::end_for;
-use crate::render::{DEFAULT_SPP, MAX_SAMPLES};
+use crate::render::{CPU_TIME, DEFAULT_SPP, MAX_SAMPLES};
 use crate::scene::Scene;
 use crate::settings::Settings;
+use crate::stats::percent;
 use crate::stats::percent_to;
 use std::ops::Range;
 use std::path::Path;
-use std::time::Duration;
 
 /// Refuses `--adapter` together with `--backend cpu`.
 pub fn check_flags(backend: Backend, adapter: Option<&str>) -> Result<(), Failure> {
@@ -76,9 +76,6 @@ pub fn as_film(args: &RenderArgs, film: &Film) -> Result<RenderArgs, Failure> {
     }
     Ok(args)
 }
-
-/// Rendering time on the CPU reference unless a stop condition is given: 256 samples of an ordinary picture take minutes there.
-const CPU_TIME: Duration = Duration::from_secs(30);
 
 /// The arguments, completed with the stop conditions that are the default on this device.
 pub fn on_device(args: &RenderArgs, device: &DeviceInfo) -> RenderArgs {
@@ -161,14 +158,26 @@ pub fn count(samples: u64) -> String {
 }
 
 /// `120 samples per pixel`, or `119 to 120 samples per pixel`.
+///
+/// With the share of the pixels of its region that have any, if not all have.
 pub fn samples_text(film: &Film) -> String {
-    match film.coverage.samples() {
+    let text = match film.coverage.samples() {
         (a, b) if a == b => count(a),
         (a, b) if film.pilot.is_some() => format!(
             "{:.1} samples per pixel on average ({a} to {b})",
             film.coverage.mean()
         ),
         (a, b) => format!("{a} to {}", count(b)),
+    };
+    let covered: u64 = film.coverage.cells().map(|(rect, _)| rect.area()).sum();
+    if covered == film.bounds.area() {
+        text
+    } else {
+        let share = covered as f64 / film.bounds.area() as f64;
+        format!(
+            "{text} in {} of the pixels, none in the others",
+            percent(share)
+        )
     }
 }
 

@@ -1,6 +1,7 @@
 //! `etendue render`: renders a scene file to pictures, a film and a report.
 
 use super::args::{Backend, RenderArgs};
+use super::check::{PATHS, idle_lights};
 use super::failure::Failure;
 use super::files::{Files, Written, write_text};
 use super::plan;
@@ -25,7 +26,7 @@ use crate::provenance::Provenance;
 use crate::render::backend::{self, Chosen};
 use crate::render::{self, memory};
 use crate::run::{self, Job, Run, StopReason, Tally};
-use crate::scene::{Canonical, Scene, check, parse};
+use crate::scene::{Bsdf, Canonical, Scene, check, parse};
 use crate::settings::{Changed, Settings};
 use crate::stats::percent;
 use crate::world::World;
@@ -146,6 +147,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     });
     let tally = run.tally;
     progress.finish();
+    if matches!(ended, Ok(StopReason::Interrupted)) && tally.counters.paths > 0 && !args.talk.quiet
+    {
+        say!("interrupted: saving what there is; another signal would lose it");
+    }
 
     // Save the film however the run ended. Write pictures only if the run did not fail, but even if the film could not be
     // saved: then they are the only result.
@@ -201,7 +206,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             );
         }
     }
-    warn(&settings, &tally.counters, &error, args.talk.quiet);
+    warn(&settings, &tally.counters, &error);
+    if error.doubt != Some(Doubt::NoLight) && (args.error.is_some() || tally.seconds > TRIAL_PAYS) {
+        warn_of_idle_lights(&scene);
+    }
     written.end()?;
     match reason {
         StopReason::Interrupted => Err(Failure::Interrupted {
@@ -399,16 +407,15 @@ fn say_end(
     written: Option<String>,
 ) {
     let mut text = String::new();
-    if reason == StopReason::Interrupted {
-        text += "interrupted: ";
-    }
     if film.coverage.is_empty() {
-        say!("{text}no samples rendered, no files written");
+        say!("interrupted: no samples rendered, no files written");
         return;
     }
     let samples = plan::samples_text(film);
     if tally.counters.paths == 0 {
-        text += &format!("the film already holds {samples}; nothing rendered");
+        text += &format!(
+            "the film already holds {samples}; nothing rendered (a larger --spp, or --time, takes more)"
+        );
     } else {
         text += &format!("{samples} in {}", clock(tally.seconds));
         if tally.seconds > 0.0 {
@@ -416,8 +423,9 @@ fn say_end(
             text += &format!(" ({speed:.3} million paths per second)");
         }
     }
-    if let Some(error) = describe(error) {
-        text += &format!(", {error}");
+    match describe(error) {
+        Some(error) => text += &format!(", {error}"),
+        None => text += ", relative error unknown",
     }
     if let Some(wanted) = args.error.filter(|_| reason != StopReason::Error) {
         text += &format!("; not yet {} with certainty", percent(wanted));
@@ -464,7 +472,7 @@ fn say_exposure(film: &Film, stops: f64) {
 const CUT_SHARE: f64 = 1e-5;
 
 /// Warnings about the picture.
-fn warn(settings: &Settings, counters: &Counters, error: &RelativeError, quiet: bool) {
+fn warn(settings: &Settings, counters: &Counters, error: &RelativeError) {
     let share = counters.truncated as f64 / counters.paths.max(1) as f64;
     if share > CUT_SHARE && settings.max_depth_is_default {
         say!(
@@ -476,9 +484,38 @@ fn warn(settings: &Settings, counters: &Counters, error: &RelativeError, quiet: 
             settings.max_depth
         );
     }
-    // The report and the picture's header have it too.
-    let doubt = error.doubt.filter(|_| !quiet);
-    match doubt {
+    warn_of_doubt(error);
+    if let Some((x, y, sample)) = counters.first_nonfinite {
+        say!(
+            "warning: {} samples were not finite and were left out, the first at pixel {x}, {y}, sample {sample}; \
+             this is a bug, please report the scene",
+            counters.nonfinite
+        );
+    }
+}
+
+/// Seconds of rendering beside which a trial of each light is nothing.
+const TRIAL_PAYS: f64 = 5.0;
+
+/// Warns of lights of which a small trial has found no light. If it is there, no error that is stated knows of it.
+fn warn_of_idle_lights(scene: &Scene) {
+    let is_specular = |b: &Bsdf| matches!(b, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. });
+    // Without glass and mirrors light samples find all light that there is.
+    if scene.lights.len() < 2 || !scene.materials.iter().any(|m| is_specular(&m.bsdf)) {
+        return;
+    }
+    for place in idle_lights(scene) {
+        say!(
+            "warning: the light at line {} has lit nothing in a trial of {PATHS} paths: if it lights the picture, its light is rare, \
+             and the stated error may not know of it",
+            place.line
+        );
+    }
+}
+
+/// A warning if the stated error may be far from the true one.
+pub fn warn_of_doubt(error: &RelativeError) {
+    match error.doubt {
         Some(Doubt::NoLight) => say!(
             "warning: no light found yet: the picture is black, and its error is not known; if the scene can show light at all \
              (see: etendue check), take more samples (--spp, --time)"
@@ -490,12 +527,5 @@ fn warn(settings: &Settings, counters: &Counters, error: &RelativeError, quiet: 
             "warning: the stated relative error is uncertain: {doubt}; take more samples (--spp, --time)"
         ),
         None => {}
-    }
-    if let Some((x, y, sample)) = counters.first_nonfinite {
-        say!(
-            "warning: {} samples were not finite and were left out, the first at pixel {x}, {y}, sample {sample}; \
-             this is a bug, please report the scene",
-            counters.nonfinite
-        );
     }
 }

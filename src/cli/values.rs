@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// A duration: `90s`, `2m`, `1h30m`, `0.5s`, or plain seconds; more than 0, at most a year.
 pub fn duration(text: &str) -> Result<Duration, String> {
-    const RULE: &str = "expected a duration such as 90s, 2m, 1h30m or plain seconds";
+    const RULE: &str = "expected a duration such as 90s, 2m, 1h30m, 7d or plain seconds";
     const YEAR: f64 = 366.0 * 86400.0;
     let mut seconds = 0.0;
     let mut rest = text;
@@ -27,6 +27,7 @@ pub fn duration(text: &str) -> Result<Duration, String> {
             .find(|c: char| c.is_ascii_digit() || c == '.')
             .unwrap_or(rest.len());
         let unit = match &rest[..unit_end] {
+            "d" => 86400.0,
             "h" => 3600.0,
             "m" | "min" => 60.0,
             "s" => 1.0,

@@ -80,12 +80,13 @@ fn verdict_sentence(v: &Verdict) -> String {
         }
         text
     } else {
-        let p = if v.p < 1e-15 {
-            "below 1e-15".into()
-        } else {
-            format!("{:.0e}", v.p)
+        // The whole picture comes first if it differs, with its own probability.
+        let first = v.findings.first();
+        let p = match first.map_or(v.p, |f| f.p) {
+            p if p < 1e-15 => "below 1e-15".into(),
+            p => format!("{p:.0e}"),
         };
-        let first = v.findings.first().map(place).unwrap_or_default();
+        let first = first.map(place).unwrap_or_default();
         format!("different {first}: the probability for equal pictures is {p} (limit {alpha})")
     }
 }

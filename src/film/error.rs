@@ -110,7 +110,9 @@ impl fmt::Display for RelativeError {
             };
         };
         f.write_str(&percent(value))?;
-        if uncertainty > 0.0 {
+        if !uncertainty.is_finite() {
+            f.write_str(" \u{b1} unknown")?;
+        } else if uncertainty > 0.0 {
             write!(f, " \u{b1} {}", percent_to(uncertainty, 2))?;
         }
         match self.doubt {

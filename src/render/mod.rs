@@ -32,6 +32,10 @@ use std::time::Duration;
 /// Samples a pixel when no stop condition is given.
 pub const DEFAULT_SPP: u64 = 256;
 
+/// Rendering time on the CPU reference unless a stop condition is given: [`DEFAULT_SPP`] samples of an ordinary picture take minutes
+/// there.
+pub const CPU_TIME: Duration = Duration::from_secs(30);
+
 /// The most samples that a pixel can have: they are numbered in 32 bits.
 pub const MAX_SAMPLES: u64 = u32::MAX as u64;
 
@@ -85,7 +89,9 @@ impl From<Invalid> for Error {
 }
 
 /// What to render, with what, and until when: the first stop condition that is met ends it. Without any it is
-/// [`DEFAULT_SPP`] samples a pixel.
+/// [`DEFAULT_SPP`] samples a pixel, and on the CPU reference at most [`CPU_TIME`].
+///
+/// A clone shares `stop` with its original: give each rendering that is cancelled on its own another one.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// Stop when every pixel has this many samples (with `adaptive`: on average).
@@ -93,9 +99,11 @@ pub struct Options {
     /// Stop after this long in the engine, but not before every pixel has a sample. How many samples that is differs from run
     /// to run.
     pub time: Option<Duration>,
-    /// Stop when the picture's estimated relative error is at most this; 0.02 is 2 %.
+    /// Stop when the picture's estimated relative error, plus twice its uncertainty, is at most this; 0.02 is 2 %. Not while there is no
+    /// light yet in a part of the picture where there might be some: give `time` or `spp` too, for where there is none.
     pub error: Option<f64>,
-    /// Set it to true, from any thread, to end the rendering at once; [`render`] then gives what there is.
+    /// Set it to true, from any thread, to end the rendering at once; [`render`] then gives what there is. Before the first sample it
+    /// ends only after the kernel is ready, with [`Error::Stopped`].
     pub stop: Arc<AtomicBool>,
     /// What renders.
     pub backend: Backend,
@@ -279,11 +287,13 @@ pub fn render_with(
     let mut chosen = backend::choose(options.backend, adapter, &world, &settings, |_| ())?;
     let ends = options.time.is_some() || options.error.is_some();
     let unless_told = if ends { MAX_SAMPLES } else { DEFAULT_SPP };
+    let on_cpu = chosen.engine.device().backend == "cpu";
+    let hurried = (on_cpu && !ends && options.spp.is_none()).then_some(CPU_TIME);
     let job = Job {
         tiles: run::tiles(&regions, chosen.tile_pixels),
         samples: 0..options.spp.unwrap_or(unless_told),
         round: settings.round(),
-        time: options.time,
+        time: options.time.or(hurried),
         error: options.error,
         black: before.black,
         call: run::CALL,

@@ -105,7 +105,8 @@ impl Picture {
         {
             return Ok(store::save(path, &self.film, &self.provenance)?);
         }
-        let format = Format::from_path(path).map_err(Error::Input)?;
+        let format = Format::from_path(path)
+            .map_err(|e| Error::Input(format!("{e}, or .npz for a film")))?;
         let options = WriteOptions::default();
         Ok(format.write(path, &self.film, &self.provenance, &options)?)
     }
