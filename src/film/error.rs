@@ -10,6 +10,10 @@
 //! which the light has come from at least [`ENOUGH`] samples. The number of samples that carry a sum is (Σ y)² / Σ y², after
 //! Kish \[Kish1965\]: for n equal samples it is n. A pixel whose own light has come from so many samples stands for itself.
 //!
+//! s² and Y must not come from the same samples. Samples of light are skewed: where they have found too much, both are too large, and
+//! the quotient is too small. So the pool of a pixel has a mean without the pixel's own light, and a pixel that stands for itself has
+//! s² from two of its replicates, and Y from the other two.
+//!
 //! A pool holds only pixels that may be as bright as the pixel itself. Otherwise a lamp would hide the noise of the wall beside
 //! it, and a black background would exaggerate the noise of an edge. If the light of two pixels comes in samples of size a (which
 //! adds a/n to the mean), the difference of their means has the variance a (Y₁ + Y₂) / n. Other pixels of a pool are darker by
@@ -148,6 +152,8 @@ pub(super) struct Light {
     pub squares: f64,
     /// Squared standard error of the mean.
     variance: f64,
+    /// Means of the replicates, if all of them have equally many samples.
+    replicates: Option<[f64; REPLICATES]>,
 }
 
 impl Light {
@@ -263,6 +269,10 @@ impl Film {
                         sum: (0..REPLICATES).map(light).sum(),
                         squares: sums.iter().map(|s| s[3]).sum(),
                         variance: error * error,
+                        replicates: counts
+                            .iter()
+                            .all(|n| *n > 0 && *n == counts[0])
+                            .then(|| std::array::from_fn(|r| light(r) / counts[r] as f64)),
                     };
                 }
             }
@@ -327,7 +337,10 @@ impl<'a> Square<'a> {
         }
         let (y, carriers, radius) = self.pool(i, mean);
         let scale = y * y + floor;
-        let value = pixel.variance / scale;
+        let value = match pixel.replicates.filter(|_| radius == 0) {
+            Some(replicates) => crossed(replicates, floor),
+            None => pixel.variance / scale,
+        };
         Term {
             value,
             pool: (y * y / scale).powi(2) * 4.0 / carriers.max(1.0),
@@ -362,6 +375,11 @@ impl<'a> Square<'a> {
                 }
             }
             best = (sum / n, carriers(sum, squares));
+            let others = n - pixel.n;
+            if best.1 >= ENOUGH && others > 0.0 {
+                // The pixel's own light would hide its own noise.
+                return ((sum - pixel.sum) / others, best.1, radius);
+            }
             if best.1 >= ENOUGH || whole {
                 return (best.0, best.1, radius);
             }
@@ -371,6 +389,31 @@ impl<'a> Square<'a> {
         }
         (best.0, best.1, RADII[RADII.len() - 1])
     }
+}
+
+/// s² / (Y² + floor) of a pixel alone. Where its samples are skewed, a mean that is too bright comes with a variance that is too large,
+/// and their quotient is too small. So each pair of replicates gives a variance, and the other two give the mean, which is
+/// independent of it. The last factor takes off what the noise of that mean adds (to second order).
+fn crossed(replicates: [f64; REPLICATES], floor: f64) -> f64 {
+    /// The expansion is of no use where the noise is as large as the mean.
+    const MOST: f64 = 0.5;
+    let mut sum = 0.0;
+    for (a, b, c, d) in [
+        (0, 1, 2, 3),
+        (0, 2, 1, 3),
+        (0, 3, 1, 2),
+        (1, 2, 0, 3),
+        (1, 3, 0, 2),
+        (2, 3, 0, 1),
+    ] {
+        let [a, b, c, d] = [a, b, c, d].map(|r: usize| replicates[r]);
+        let y = 0.5 * (c + d);
+        let noise = 0.25 * (c - d).powi(2);
+        let scale = y * y + floor;
+        let curvature = (3.0 * y * y - floor) / (scale * scale);
+        sum += 0.125 * (a - b).powi(2) / scale * (1.0 - (curvature * noise).clamp(-MOST, MOST));
+    }
+    sum / 6.0
 }
 
 /// The columns and rows within `radius` of pixel number i.

@@ -59,7 +59,10 @@ impl CpuEngine {
     pub fn device_info() -> DeviceInfo {
         DeviceInfo {
             name: "CPU reference (f64)".to_owned(),
-            driver: format!("{} threads", rayon::current_num_threads()),
+            driver: match rayon::current_num_threads() {
+                1 => "1 thread".to_owned(),
+                n => format!("{n} threads"),
+            },
             backend: "cpu".to_owned(),
             software: true,
         }

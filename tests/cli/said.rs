@@ -519,3 +519,17 @@ fn mirrors_that_show_nothing_are_not_in_doubt() {
         serde_json::from_slice(&fs::read(bench.path("r.json")).unwrap()).unwrap();
     assert_eq!(report["stop_reason"], "error");
 }
+
+/// As many threads as the process may use, not as many as the machine has.
+#[cfg(target_os = "linux")]
+#[test]
+fn affinity_sets_the_number_of_threads() {
+    let bench = Bench::new();
+    let pinned = "taskset -c 0 \"$0\" render box.toml --backend cpu --spp 1 -o a.png";
+    assert_eq!(bench.shell(&[], pinned), 0, "{}", bench.said());
+    assert!(
+        bench.said().contains("CPU reference (1 thread)"),
+        "{}",
+        bench.said()
+    );
+}
