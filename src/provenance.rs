@@ -27,7 +27,7 @@ pub struct Provenance {
     pub scene_title: Option<String>,
     /// [`scene_hash`](hash::scene_hash) of scene and settings.
     pub scene_hash: String,
-    /// The scene file's own text.
+    /// The scene file's own text; of a scene that a program has rendered, the scene written out.
     pub scene_text: String,
     /// The settings, which together with the scene determine the samples.
     pub settings: Settings,

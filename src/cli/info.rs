@@ -161,8 +161,31 @@ impl Info {
             line("channels", &self.channels.join(", "));
         }
         for (key, value) in &self.entries {
-            line(key, value);
+            // What is computed has sixteen digits, of which a reader wants four.
+            match value.parse::<f64>() {
+                Ok(x) if x.fract() != 0.0 => line(key, &four_digits(x)),
+                _ => line(key, value),
+            }
         }
         text
+    }
+}
+
+/// A number to four significant digits.
+fn four_digits(x: f64) -> String {
+    let places = 3 - x.abs().log10().floor() as i32;
+    format!("{x:.*}", places.clamp(0, 12) as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn numbers_are_short() {
+        let short =
+            [0.089_196_232_2, 5.271_887, 220.666_666, 12_345.678, 1.5e-9].map(super::four_digits);
+        assert_eq!(
+            short,
+            ["0.08920", "5.272", "220.7", "12346", "0.000000001500"]
+        );
     }
 }

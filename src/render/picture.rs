@@ -111,14 +111,16 @@ impl Picture {
         Ok(format.write(path, &self.film, &self.provenance, &options)?)
     }
 
-    /// Writes it to `path` as PNG, brightened by `stops` powers of two.
+    /// Writes it to `path` as PNG, brightened by `stops` powers of two. The name must end in `.png`.
     pub fn save_png(&self, path: impl AsRef<Path>, stops: f64) -> Result<(), Error> {
-        Ok(write_png(
-            path.as_ref(),
-            &self.film,
-            &self.provenance,
-            stops,
-        )?)
+        let path = path.as_ref();
+        if Format::from_path(path) != Ok(Format::Png) || !stops.is_finite() {
+            let path = path.display();
+            return Err(Error::Input(format!(
+                "{path}: a PNG picture has a name that ends in .png, and a finite exposure; the exposure is {stops}"
+            )));
+        }
+        Ok(write_png(path, &self.film, &self.provenance, stops)?)
     }
 
     /// Compares it with `reference`. The verdict has no threshold but its rate of false alarms, one in a thousand. It is exact

@@ -236,6 +236,15 @@ fn pictures_are_saved_by_the_ending_of_their_name() {
         assert_eq!(read.size, [16, 12], "{name}");
     }
     picture.save_png(folder.path().join("b.png"), 1.0).unwrap();
+    for (name, stops) in [("b.exr", 1.0), ("c.png", f64::NAN)] {
+        let refused = picture.save_png(folder.path().join(name), stops);
+        assert!(matches!(refused, Err(Error::Input(_))), "{refused:?}");
+    }
+    let refused = picture.save(folder.path().join("a.jpg")).unwrap_err();
+    assert!(
+        refused.to_string().ends_with("or .npz for a film"),
+        "{refused}"
+    );
     assert!(matches!(picture.save("x.tiff"), Err(Error::Input(_))));
     let nowhere = folder.path().join("none").join("a.exr");
     assert!(matches!(picture.save(nowhere), Err(Error::File(_))));
