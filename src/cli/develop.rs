@@ -1,10 +1,10 @@
 //! `etendue develop`: pictures from a film.
 
 use super::args::DevelopArgs;
+use super::ending::warn_of_doubt;
 use super::failure::Failure;
 use super::files::{Files, Written};
 use super::progress::Progress;
-use super::render::warn_of_doubt;
 use crate::output::Format;
 use crate::output::store;
 

@@ -7,6 +7,7 @@ mod check;
 mod compare;
 mod develop;
 mod drivers;
+mod ending;
 mod failure;
 mod files;
 mod info;

@@ -1,21 +1,20 @@
 //! `etendue render`: renders a scene file to pictures, a film and a report.
 
 use super::args::{Backend, RenderArgs};
-use super::check::{PATHS, idle_lights};
 use super::failure::Failure;
 use super::files::{Files, Written, write_text};
-use super::plan;
-use super::progress::{Progress, clock, describe};
+use super::progress::{Progress, clock};
 use super::saver::{Saver, longest_call};
 use super::say;
 use super::signals::Signals;
 use super::stages::Stages;
-use crate::engine::{Counters, DeviceInfo};
+use super::{ending, plan};
+use crate::engine::DeviceInfo;
 use crate::files::FileError;
 use crate::files::lock::Lock;
 use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::error::{Doubt, RelativeError};
+use crate::film::error::Doubt;
 use crate::film::pilot::Pilot;
 use crate::gpu::Making;
 use crate::kernel::{self, Access};
@@ -25,13 +24,15 @@ use crate::output::store;
 use crate::provenance::Provenance;
 use crate::render::backend::{self, Chosen};
 use crate::render::{self, memory};
-use crate::run::{self, Job, Run, StopReason, Tally};
-use crate::scene::{Bsdf, Canonical, Scene, check, parse};
+use crate::run::{self, Job, Run, StopReason};
+use crate::scene::{Canonical, Scene, check, parse};
 use crate::settings::{Changed, Settings};
-use crate::stats::percent;
 use crate::world::World;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Seconds of rendering beside which a trial of each light is nothing.
+const TRIAL_PAYS: f64 = 5.0;
 
 /// Renders a scene.
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
@@ -194,10 +195,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     // This looks at every pixel.
     let error = provenance.error(&film);
     if !args.talk.quiet {
-        say_end(args, &film, &error, &tally, reason, written.list());
+        ending::say_end(args, &film, &error, &tally, reason, written.list());
         let is_png = |path: &PathBuf| Format::from_path(path) == Ok(Format::Png);
         if outputs.iter().any(is_png) {
-            say_exposure(&film, args.pictures.exposure);
+            ending::say_exposure(&film, args.pictures.exposure);
         }
         if reason == StopReason::Time && time_is_default {
             say!(
@@ -206,9 +207,10 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             );
         }
     }
-    warn(&settings, &tally.counters, &error);
-    if error.doubt != Some(Doubt::NoLight) && (args.error.is_some() || tally.seconds > TRIAL_PAYS) {
-        warn_of_idle_lights(&scene);
+    ending::warn(&settings, &tally.counters, &error);
+    let tries_lights = args.error.is_some() || tally.seconds > TRIAL_PAYS;
+    if tries_lights && error.doubt != Some(Doubt::NoLight) && reason != StopReason::Interrupted {
+        ending::warn_of_idle_lights(&scene);
     }
     written.end()?;
     match reason {
@@ -394,138 +396,5 @@ fn stop_reason(args: &RenderArgs, reason: StopReason) -> &'static str {
         StopReason::Time => "time",
         StopReason::Error => "error",
         StopReason::Interrupted => "interrupted",
-    }
-}
-
-/// The last lines: samples, time, speed, error, and the files written.
-fn say_end(
-    args: &RenderArgs,
-    film: &Film,
-    error: &RelativeError,
-    tally: &Tally,
-    reason: StopReason,
-    written: Option<String>,
-) {
-    let mut text = String::new();
-    if film.coverage.is_empty() {
-        say!("interrupted: no samples rendered, no files written");
-        return;
-    }
-    let samples = plan::samples_text(film);
-    if tally.counters.paths == 0 {
-        text += &format!(
-            "the film already holds {samples}; nothing rendered (a larger --spp, or --time, takes more)"
-        );
-    } else {
-        text += &format!("{samples} in {}", clock(tally.seconds));
-        if tally.seconds > 0.0 {
-            let speed = tally.counters.paths as f64 / tally.seconds / 1e6;
-            text += &format!(" ({speed:.3} million paths per second)");
-        }
-    }
-    match describe(error) {
-        Some(error) => text += &format!(", {error}"),
-        None => text += ", relative error unknown",
-    }
-    if let Some(wanted) = args.error.filter(|_| reason != StopReason::Error) {
-        text += &format!("; not yet {} with certainty", percent(wanted));
-    }
-    say!("{text}");
-    if let Some(list) = written {
-        say!("wrote {list}");
-    }
-}
-
-/// A note if most of a PNG picture is white or black, with an exposure that shows it.
-fn say_exposure(film: &Film, stops: f64) {
-    /// Linear values that are pure white and pure black in 8 bits.
-    const WHITE: f64 = 1.0;
-    const BLACK: f64 = 0.5 / 255.0 / 12.92;
-    /// Where the middle of the pixels is to lie.
-    const GREY: f64 = 0.18;
-    let gain = stops.exp2();
-    let mut light = Vec::new();
-    film.for_each(|_, _, e| light.push(e.mean.into_iter().fold(0.0, f64::max)));
-    light.retain(|x| *x > 0.0);
-    let share = |is: &dyn Fn(f64) -> bool| {
-        let count = light.iter().filter(|x| is(**x * gain)).count();
-        count as f64 / light.len().max(1) as f64
-    };
-    let (white, black) = (share(&|x| x > WHITE), share(&|x| x < BLACK));
-    let (share, what) = if white > black {
-        (white, "white")
-    } else {
-        (black, "black")
-    };
-    if share > 0.5 {
-        let middle = light.len() / 2;
-        let (_, median, _) = light.select_nth_unstable_by(middle, f64::total_cmp);
-        let better = (GREY / *median).log2().round();
-        say!(
-            "note: {} of the lit pixels are {what} in the PNG; try --exposure {better:+}",
-            percent(share)
-        );
-    }
-}
-
-/// If fewer paths than this share are truncated, the picture is not visibly darker, so only the report gives their number.
-const CUT_SHARE: f64 = 1e-5;
-
-/// Warnings about the picture.
-fn warn(settings: &Settings, counters: &Counters, error: &RelativeError) {
-    let share = counters.truncated as f64 / counters.paths.max(1) as f64;
-    if share > CUT_SHARE && settings.max_depth_is_default {
-        say!(
-            "warning: {} of {} paths ({}) were truncated after {} vertices, which can darken the picture by about that \
-             fraction; raise the limit with --max-depth N",
-            counters.truncated,
-            counters.paths,
-            percent(share),
-            settings.max_depth
-        );
-    }
-    warn_of_doubt(error);
-    if let Some((x, y, sample)) = counters.first_nonfinite {
-        say!(
-            "warning: {} samples were not finite and were left out, the first at pixel {x}, {y}, sample {sample}; \
-             this is a bug, please report the scene",
-            counters.nonfinite
-        );
-    }
-}
-
-/// Seconds of rendering beside which a trial of each light is nothing.
-const TRIAL_PAYS: f64 = 5.0;
-
-/// Warns of lights of which a small trial has found no light. If it is there, no error that is stated knows of it.
-fn warn_of_idle_lights(scene: &Scene) {
-    let is_specular = |b: &Bsdf| matches!(b, Bsdf::Mirror { .. } | Bsdf::Dielectric { .. });
-    // Without glass and mirrors light samples find all light that there is.
-    if scene.lights.len() < 2 || !scene.materials.iter().any(|m| is_specular(&m.bsdf)) {
-        return;
-    }
-    for place in idle_lights(scene) {
-        say!(
-            "warning: the light at line {} has lit nothing in a trial of {PATHS} paths: if it lights the picture, its light is rare, \
-             and the stated error may not know of it",
-            place.line
-        );
-    }
-}
-
-/// A warning if the stated error may be far from the true one.
-pub fn warn_of_doubt(error: &RelativeError) {
-    match error.doubt {
-        Some(Doubt::NoLight) => say!(
-            "warning: no light found yet: the picture is black, and its error is not known; if the scene can show light at all \
-             (see: etendue check), take more samples (--spp, --time)"
-        ),
-        Some(doubt @ Doubt::Unlit(_)) => say!(
-            "warning: {doubt}, so the true relative error may be far above the stated one; take more samples (--spp, --time)"
-        ),
-        Some(doubt @ Doubt::Uncertain) => say!(
-            "warning: the stated relative error is uncertain: {doubt}; take more samples (--spp, --time)"
-        ),
-        None => {}
     }
 }
