@@ -23,8 +23,8 @@ struct Path {
     only_lights: bool,
     // Glances still to be sent before the path itself, this one included: see glance/.
     glances: u32,
-    // What is known of mirror balls on the way: see image/.
-    trail: ImageTrail,
+    // What light that is met by chance is weighed against beside light samples: see light_path/.
+    trail: LightTrail,
 }
 
 @compute @workgroup_size(64)
@@ -36,7 +36,8 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     var film: PixelFilm;
     load_pixel(pixel, &film);
     let sight = sight_of(film.mark);
-    begin_trips(&film);
+    begin_trips();
+    keep_counts(&film, true);
     var path: Path;
     begin_path(&path, true, camera_path(pixel, film.s, sight.glances, sight), sight.glances, vec3f(0.0));
     // One vertex of a path a turn. The host keeps the turns below the driver's limit on loop trips, or the kernel counts them.
@@ -55,7 +56,7 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         // motions.
         let meets_surface = !meets_light & (hit.key != NONE) & looks_on(&path, sight);
         let met = Hit(hit.t, select(0u, hit.key, meets_surface));
-        let lives = spend_trips(&film, scatter_if(meets_surface, &path, met, pixel, sight, &film));
+        let lives = spend_trips(scatter_if(meets_surface, &path, met, pixel, sight, &film));
 
         // Add the sample of a path that has ended and start the next at once: no lane waits for a longer path.
         let is_sample = !lives & !is_glance(&path);

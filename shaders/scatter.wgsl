@@ -4,27 +4,13 @@
 // the way round. So this text selects. Where the compiler wants branches, control/branching.wgsl and the generated functions of
 // the materials have them.
 
-fn interaction(ray: Ray, hit: Hit, way: u32) -> Interaction {
-    let surface = surface_at(hit.key);
-    let material = material_at(surface.material);
-    let v = vertex_at(ray, hit, surface);
-    // Glass knows the side, where a grazing cosine may round to either sign.
-    let outside = select(dot(v.n, ray.d) < 0.0, ray.medium != surface.solid, is_dielectric(material));
-    let n = select(-v.n, v.n, outside);
-    let cos_o = abs(dot(v.n, ray.d));
-    let face = face_at(hit.key, surface);
-    return Interaction(
-        v.p, n, -ray.d, cos_o, outside, face, hit.key >> 2u, material, ray.medium, surface.solid, surface.parent, way
-    );
-}
-
 // Gathers direct light at `hit` and sends the path on. False if the path ends there, or meets no surface.
 fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight: Sight, film: ptr<function, PixelFilm>) -> bool {
     var x = interaction(path.ray, hit, way_at_glass(path, pixel, film.s, sight));
     let specular = is_specular(x.material);
 
     // Does it end here? The vertex on the light counts too, so nothing can be gathered beyond the last one.
-    let wanted = meets & !(WHITTED & path.only_lights) & (specular | !is_glance(path)) & trail_goes_on(path.trail, &x);
+    let wanted = meets & !(WHITTED & path.only_lights) & (specular | !is_glance(path));
     let last = path.depth >= LAST_DEPTH;
     count_truncated(film, COUNT_TRUNCATED & last & wanted);
     note_further(film, meets & !path.all_specular);
@@ -41,15 +27,15 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
     path.only_lights = path.only_lights | (WHITTED & !specular);
 
     // A new direction.
-    var scattered = sample_bsdf(&x, u);
-    let astray = follow_images(path, &x, direct.weights, u, &scattered);
+    let scattered = sample_bsdf(&x, u);
+    follow_trail(path, &x, hit.t, scattered);
     path.ray = Ray(x.p, scattered.wi, x.face, scattered.medium, NO_FACE);
     path.specular = scattered.specular;
     path.pdf = scattered.pdf;
     path.receiver = receiver;
     path.light_weights = direct.weights;
     path.depth += 1u;
-    return survives_roulette(path, scattered, u.roulette) && goes_on && !astray;
+    return survives_roulette(path, scattered, u.roulette) && goes_on;
 }
 
 // Share of `shown` below which a path may be ended. By squared error 0.85 and 1 had 0.88 to 1.08 and 0.80 to 1.12 of the efficiency of
@@ -61,12 +47,11 @@ const ROULETTE_SHARE: f32 = 0.7;
 fn survives_roulette(path: ptr<function, Path>, scattered: Scattered, u: f32) -> bool {
     let beta = path.beta * scattered.weight;
     let brightest = fmax(fmax(beta.x, beta.y), beta.z);
-    let all_specular = path.all_specular & scattered.specular & !is_sent(path.trail);
+    let all_specular = path.all_specular & scattered.specular;
     path.shown = select(path.shown, brightest, path.all_specular & !all_specular);
     path.all_specular = all_specular;
     // Glances are few and short, and what they show is to be free of noise.
-    let spared = is_glance(path) | is_sent(path.trail);
-    let survival = select(fmin(1.0, brightest / fmax(ROULETTE_SHARE * path.shown, TINY)), 1.0, spared);
+    let survival = select(fmin(1.0, brightest / fmax(ROULETTE_SHARE * path.shown, TINY)), 1.0, is_glance(path));
     path.beta = beta * (1.0 / fmax(survival, TINY));
     return brightest > 0.0 && u < survival;
 }

@@ -2,6 +2,7 @@
 
 use crate::film::Film;
 use crate::film::coverage::Rect;
+use crate::film::splats::SplatSetup;
 use std::ops::{AddAssign, Range};
 use std::sync::atomic::AtomicBool;
 
@@ -52,7 +53,8 @@ pub trait Engine {
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError>;
 
-    /// [`render_parts`](Self::render_parts) with a single part, of all pixels of `rect`.
+    /// [`render_parts`](Self::render_parts) with a single part, of all pixels of `rect`, after the same numbers of passes of light paths,
+    /// if the engine has any.
     fn render(
         &mut self,
         film: &mut Film,
@@ -60,7 +62,36 @@ pub trait Engine {
         samples: Range<u64>,
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError> {
-        self.render_parts(film, rect, &[Part { rect, samples }], stop)
+        let mut counters = Counters::default();
+        if let Some(setup) = self.light_paths() {
+            if film.splats().is_none() {
+                film.begin_splats(setup);
+            }
+            for (passes, rects) in film.lacking_passes(&[rect], samples.clone()) {
+                counters += self.trace_light(film, &rects, passes, stop)?;
+            }
+        }
+        counters += self.render_parts(film, rect, &[Part { rect, samples }], stop)?;
+        Ok(counters)
+    }
+
+    /// What passes of light paths add to a film; `None` if samples are the whole picture.
+    fn light_paths(&self) -> Option<SplatSetup> {
+        None
+    }
+
+    /// Adds `passes` of light paths to the pixels of `rects`, which have none of them, of a film that has
+    /// [room for splats](Film::begin_splats). The work does not depend on how many pixels there are. When `stop` becomes true, the call may
+    /// return [`EngineError::Stopped`]. After an error the film is unchanged.
+    fn trace_light(
+        &mut self,
+        film: &mut Film,
+        rects: &[Rect],
+        passes: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError> {
+        let _ = (film, rects, passes, stop);
+        Ok(Counters::default())
     }
 
     /// Changes the seed of later samples.
@@ -125,6 +156,9 @@ pub struct Counters {
     pub rays: u64,
     /// Paths cut at max_depth.
     pub truncated: u64,
+    /// Light paths.
+    #[serde(default)]
+    pub light_paths: u64,
     /// Samples left out because they were NaN or infinite.
     pub nonfinite: u64,
     /// Pixel x, y and number of the first of those.
@@ -136,6 +170,7 @@ impl AddAssign for Counters {
         self.paths += other.paths;
         self.rays += other.rays;
         self.truncated += other.truncated;
+        self.light_paths += other.light_paths;
         self.nonfinite += other.nonfinite;
         self.first_nonfinite = self.first_nonfinite.or(other.first_nonfinite);
     }

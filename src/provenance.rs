@@ -12,7 +12,7 @@ use hash::hash_of;
 use serde::{Deserialize, Serialize, Serializer};
 
 /// Incremented whenever a change to the program changes the value of any sample.
-pub const SAMPLER_VERSION: u32 = 8;
+pub const SAMPLER_VERSION: u32 = 9;
 
 /// The scene, program and devices that a film was rendered with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -168,6 +168,8 @@ impl Provenance {
             a.shadow_rays.to_string(),
             b.shadow_rays.to_string(),
         );
+        let paths = |s: &Settings| if s.light_paths { "traced" } else { "off" }.to_owned();
+        check("light_paths", paths(a), paths(b));
         check("seed", a.seed.to_string(), b.seed.to_string());
         let sampler = |p: &Self| format!("{} (of version {})", p.sampler_version, p.version);
         if self.sampler_version != other.sampler_version {
@@ -259,6 +261,7 @@ pub(crate) mod tests {
                 shadow_rays: 1,
                 light: LightParts::ALL,
                 integrator: Integrator::Path,
+                light_paths: true,
             },
             samples: 0.0,
             replicates: 0,
@@ -288,6 +291,7 @@ pub(crate) mod tests {
             paths,
             rays: 3 * paths,
             truncated: 1,
+            light_paths: paths,
             nonfinite: 1,
             first_nonfinite: Some((1, 2, paths)),
         }

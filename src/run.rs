@@ -152,6 +152,8 @@ pub struct Run<'a> {
     pub tally: Tally,
     /// Seconds per sample of one pixel, measured in the last call.
     pace: Option<f64>,
+    /// Seconds of a pass of light paths, measured in the last call; 0 without them.
+    light_pace: f64,
     /// Pixels of the largest tile.
     widest: u64,
     /// Pixels of all tiles.
@@ -170,6 +172,12 @@ impl<'a> Run<'a> {
         film: &'a mut Film,
         stop: &'a AtomicBool,
     ) -> Self {
+        if let Some(setup) = engine.light_paths()
+            && film.coverage.is_empty()
+            && film.splats().is_none()
+        {
+            film.begin_splats(setup);
+        }
         let pixels: u64 = job.tiles.iter().map(Rect::area).sum();
         let samples = match job.adaptive {
             Some(_) => held(&film.coverage, job) / pixels as f64,
@@ -190,6 +198,7 @@ impl<'a> Run<'a> {
                 ..Tally::default()
             },
             pace: None,
+            light_pace: 0.0,
             widest: job.tiles.iter().map(Rect::area).max().unwrap_or(0),
             pixels,
             samples_before: samples,
@@ -220,6 +229,10 @@ impl<'a> Run<'a> {
             }
             let end = self.pass_end(at);
             let learning = self.pace.is_none();
+            // Light comes first: no pixel may have more samples than passes.
+            if !self.trace_light(at..end, &mut after)? {
+                return Ok(StopReason::Interrupted);
+            }
             for tile in &job.tiles {
                 for (rect, ranges) in self.film.coverage.missing(*tile, at..end) {
                     for samples in ranges {
@@ -243,6 +256,44 @@ impl<'a> Run<'a> {
                 }
             }
         }
+    }
+
+    /// Traces the light paths of `passes` that the job's pixels lack, in calls of the right length. Returns false if it was stopped.
+    fn trace_light<E: From<EngineError>>(
+        &mut self,
+        passes: Range<u64>,
+        after: &mut impl FnMut(&Film, &Tally) -> Result<(), E>,
+    ) -> Result<bool, E> {
+        for (lacking, rects) in self.film.lacking_passes(&self.job.tiles, passes) {
+            let mut at = lacking.start;
+            while at < lacking.end {
+                if self.stop.load(Ordering::Relaxed) {
+                    return Ok(false);
+                }
+                let fits = match self.light_pace {
+                    0.0 => 1,
+                    pace => (self.job.call.as_secs_f64() / pace) as u64,
+                };
+                let end = lacking.end.min(at + fits.max(1));
+                let begun = Instant::now();
+                let result = self
+                    .engine
+                    .trace_light(self.film, &rects, at..end, self.stop);
+                let seconds = begun.elapsed().as_secs_f64();
+                self.tally.seconds += seconds;
+                match result {
+                    Ok(counters) => self.tally.counters += counters,
+                    Err(EngineError::Stopped) => return Ok(false),
+                    Err(e) => return Err(e.into()),
+                }
+                self.light_pace = seconds / (end - at) as f64;
+                at = end;
+                if !self.film.coverage.is_empty() {
+                    after(self.film, &self.tally)?;
+                }
+            }
+        }
+        Ok(true)
     }
 
     /// Calls the engine once. Returns false if it was stopped.
@@ -295,7 +346,8 @@ impl<'a> Run<'a> {
             if let Some(time) = self.job.time {
                 // All tiles must have the same count when the time is used up.
                 let left = (time.as_secs_f64() - self.tally.seconds).max(0.0);
-                length = length.min(fits(left, self.pixels));
+                let sample = pace * self.pixels as f64 + self.light_pace;
+                length = length.min((left / sample) as u64);
             }
         }
         (at + length.max(1))

@@ -59,6 +59,8 @@ pub struct Overrides {
     pub light: Option<LightParts>,
     /// `--integrator`.
     pub integrator: Option<Integrator>,
+    /// `--light-paths`.
+    pub light_paths: Option<bool>,
 }
 
 impl Overrides {
@@ -74,6 +76,7 @@ impl Overrides {
             shadow_rays: self.shadow_rays.or(Some(held.shadow_rays)),
             light: self.light.or(Some(held.light)),
             integrator: self.integrator.or(Some(held.integrator)),
+            light_paths: self.light_paths.or(Some(held.light_paths)),
         }
     }
 
@@ -95,6 +98,10 @@ impl Overrides {
             (
                 "--integrator",
                 self.integrator.is_some_and(|x| x != held.integrator),
+            ),
+            (
+                "--light-paths",
+                self.light_paths.is_some_and(|x| x != held.light_paths),
             ),
         ];
         all.into_iter().filter(|f| f.1).map(|f| f.0).collect()
@@ -166,6 +173,9 @@ pub struct Settings {
     pub light: LightParts,
     /// How light travels.
     pub integrator: Integrator,
+    /// Whether light paths are traced where the scene has a use for them; in a film, whether they were.
+    #[serde(default)]
+    pub light_paths: bool,
 }
 
 impl Settings {
@@ -182,6 +192,7 @@ impl Settings {
             shadow_rays: flags.shadow_rays.unwrap_or(1),
             light: flags.light.unwrap_or(LightParts::ALL),
             integrator: flags.integrator.unwrap_or(Integrator::Path),
+            light_paths: flags.light_paths.unwrap_or(true),
         }
     }
 

@@ -5,7 +5,7 @@ fn emission(path: ptr<function, Path>, hit: Hit) -> vec3f {
     let index = hit.key >> 2u;
     let light = light_at(index);
     let front = dot(path.ray.d, light.normal) < 0.0;
-    let counts = front & keeps(path.depth - 1u) & counts_light(path.trail, index);
-    let weight = chance_weight(path, light, index) * light_scale(path.ray.medium);
+    let counts = front & keeps(path.depth - 1u);
+    let weight = chance_weight(path, light, index) * share_of_chance(path, hit, light, index) * light_scale(path.ray.medium);
     return light.radiance * select(0.0, weight, counts);
 }

@@ -75,7 +75,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     stages.begin(format!("hashing {things}"));
     let new = Provenance::of(&ordered, text, &settings);
     stages.end();
-    let (mut film, provenance) = match (old, &args.film) {
+    let (mut film, mut provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
             check_same_samples(args, path, &held, &new)?;
             plan::check_bounds(path, &film, bounds)?;
@@ -108,6 +108,12 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         });
     })?;
     stages.end();
+    let light_paths = chosen.engine.light_paths();
+    if film.coverage.is_empty() {
+        provenance.settings.light_paths = light_paths.is_some();
+    } else if film.splats().map(|s| s.setup) != light_paths {
+        return Err(other_light_paths(args, &film));
+    }
     let time_is_default = args.time.is_none();
     let args = &plan::on_device(args, chosen.engine.device());
     if let Some(path) = &args.dump_wgsl {
@@ -321,6 +327,19 @@ fn check_same_samples(
     })
 }
 
+/// A film that has light paths cannot be resumed without, and the other way round: samples leave out what light paths bring.
+fn other_light_paths(args: &RenderArgs, film: &Film) -> Failure {
+    let advice = match (film.splats(), args.backend) {
+        (Some(_), Backend::Gpu) => "it is not of this scene's light paths",
+        (Some(_), _) => {
+            "it has light paths, which the CPU reference does not trace; resume it with --backend gpu"
+        }
+        (None, _) => "it has no light paths; resume it with --light-paths off",
+    };
+    let path = args.film.clone().unwrap_or_default();
+    FileError::content(&path, format!("this film can't be resumed here: {advice}")).into()
+}
+
 /// What is suspect about the scene: in full where it changes the picture, by number where it does not.
 fn say_suspect(args: &RenderArgs, scene: &Scene, settings: &Settings, device: &DeviceInfo) {
     let on_gpu = (device.backend != "cpu").then_some(settings.size);
@@ -361,6 +380,9 @@ fn say_start(
     // Only what is out of the ordinary.
     if let Some(access) = chosen.access.filter(|a| *a != Access::Baked) {
         text += &format!(", {} kernel", access.name());
+    }
+    if chosen.engine.light_paths().is_some() {
+        text += ", with light paths";
     }
     if let (Some(path), false) = (&args.film, film.coverage.is_empty()) {
         let held = plan::brief_samples(film);

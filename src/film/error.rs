@@ -260,8 +260,8 @@ impl Film {
             let given = replicate_counts(ranges, self.strata);
             for y in rect.y0..rect.y1 {
                 for x in rect.x0..rect.x1 {
-                    let sums = self.total(x, y);
                     let counts = self.left_out.remaining(x, y, &given);
+                    let sums = self.all_light(x, y, &counts);
                     let light = |r: usize| luminance([sums[r][0], sums[r][1], sums[r][2]]);
                     let error = super::estimate(&sums, &counts).error[3];
                     pixels[self.index(x, y)] = Light {

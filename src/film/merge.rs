@@ -32,6 +32,17 @@ pub enum MergeError {
         /// Sample numbers that both have there.
         samples: Range<u64>,
     },
+    /// Passes of light paths would count twice: one of the films was interrupted.
+    #[error("passes {}..{} of light paths are in both films, for pixels {}", passes.start, passes.end, rect)]
+    Passes {
+        /// Pixels that both have.
+        rect: Rect,
+        /// Numbers of passes that both have there.
+        passes: Range<u64>,
+    },
+    /// Only one has light paths, or they are not equally many.
+    #[error("the films do not have the same light paths (--light-paths)")]
+    LightPaths,
 }
 
 impl MergeError {
@@ -64,6 +75,15 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
         });
     }
     MergeError::overlap(&into.coverage, &other.coverage)?;
+    match (&into.splats, &other.splats) {
+        (None, None) => {}
+        (Some(a), Some(b)) if a.setup == b.setup => {
+            if let Some((rect, passes)) = a.coverage.common(&b.coverage) {
+                return Err(MergeError::Passes { rect, passes });
+            }
+        }
+        _ => return Err(MergeError::LightPaths),
+    }
     grow(into, into.bounds.union(&other.bounds));
     if into.partial.is_empty() && !other.partial.is_empty() {
         into.partial = vec![Default::default(); into.sums.len()];
@@ -83,6 +103,9 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
         for samples in ranges {
             into.coverage.add(rect, samples.clone());
         }
+    }
+    if let (Some(a), Some(b)) = (&mut into.splats, &other.splats) {
+        a.merge(b, [into.bounds, other.bounds], into.strata);
     }
     into.left_out.merge(&other.left_out);
     if !other.reached.is_empty() {
@@ -140,9 +163,12 @@ fn grow(film: &mut Film, bounds: Rect) {
     if !film.reached.is_empty() {
         move_rows(&mut film.reached, old, bounds);
     }
+    if let Some(splats) = &mut film.splats {
+        splats.move_rows(old, bounds);
+    }
 }
 
-fn move_rows<T: Copy + Default>(pixels: &mut Vec<T>, old: Rect, new: Rect) {
+pub(super) fn move_rows<T: Copy + Default>(pixels: &mut Vec<T>, old: Rect, new: Rect) {
     if old == new {
         return;
     }

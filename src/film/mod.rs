@@ -13,12 +13,14 @@ mod left_out;
 pub mod merge;
 pub mod pilot;
 mod pooled;
+pub mod splats;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};
 pub use left_out::LeftOut;
 use pilot::Pilot;
 use rayon::prelude::*;
+use splats::Splats;
 use std::mem::take;
 use std::ops::Range;
 
@@ -50,6 +52,8 @@ pub struct Film {
     left_out: LeftOut,
     /// The pilots of an adaptive film (`--adaptive`).
     pub pilot: Option<Pilot>,
+    /// What light paths have brought.
+    splats: Option<Splats>,
     /// How far paths of each pixel have got, as a [`Reach`], in the order of `sums`; 0 where they have met nothing. Empty if that is
     /// so everywhere, or if it is not known.
     reached: Vec<u8>,
@@ -92,6 +96,7 @@ impl Film {
             partial: Vec::new(),
             left_out: LeftOut::default(),
             pilot: None,
+            splats: None,
             reached: Vec::new(),
         }
     }
@@ -117,6 +122,7 @@ impl Film {
             partial,
             left_out: LeftOut::default(),
             pilot: None,
+            splats: None,
             reached: Vec::new(),
         }
     }
@@ -259,7 +265,7 @@ impl Film {
         &self.left_out
     }
 
-    /// Finished and unfinished sums of a pixel together.
+    /// Finished and unfinished sums of a pixel's samples together, without its splats.
     pub fn total(&self, x: u32, y: u32) -> [Sums<f64>; REPLICATES] {
         let i = self.index(x, y);
         let mut total = self.sums[i];
@@ -276,7 +282,8 @@ impl Film {
     /// is used: √(Σ Y²)/n for the luminance, distributed over the channels in proportion to their
     /// means. On average it is not too small (E Y² >= Var Y). `replicates` is then 1.
     pub fn estimate(&self, x: u32, y: u32, counts: &[u64; REPLICATES]) -> Estimate {
-        estimate(&self.total(x, y), &self.left_out.remaining(x, y, counts))
+        let counts = self.left_out.remaining(x, y, counts);
+        estimate(&self.all_light(x, y, &counts), &counts)
     }
 
     /// Calls `f(x, y, estimate)` for every pixel of the film that has samples.

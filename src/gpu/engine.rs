@@ -2,6 +2,7 @@
 
 use super::glances::GlanceMarks;
 use super::held::{Held, continues_block, count_row};
+use super::light_paths::{self, LightTracer};
 use super::pack::pack;
 use super::tile::{self, Tile};
 use super::work::{Work, coprime_stride, workgroups};
@@ -9,6 +10,7 @@ use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::Film;
 use crate::film::coverage::Rect;
+use crate::film::splats::SplatSetup;
 use crate::kernel::layout::Params;
 use crate::kernel::{Access, Kernel, compose, trips};
 use crate::settings::Settings;
@@ -32,6 +34,10 @@ pub struct GpuEngine {
     kernel: Kernel,
     pipeline: wgpu::ComputePipeline,
     scene: wgpu::BindGroup,
+    /// Group 2, if the path kernel reads it.
+    aims: Option<wgpu::BindGroup>,
+    /// What traces light paths, if the scene has a use for them.
+    light: Option<LightTracer>,
     film_layout: wgpu::BindGroupLayout,
     params: wgpu::Buffer,
     tile: Option<Tile>,
@@ -167,9 +173,13 @@ impl GpuEngine {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let scene_layout = scene::layout(device, kernel.access);
         let film_layout = tile::layout(device);
+        let bound = kernel.light.as_ref().filter(|l| l.aims_bound);
+        let aims_layout = bound.map(|_| light_paths::aims_layout(device));
+        let mut layouts = vec![Some(&scene_layout), Some(&film_layout)];
+        layouts.extend(aims_layout.as_ref().map(Some));
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: None,
-            bind_group_layouts: &[Some(&scene_layout), Some(&film_layout)],
+            bind_group_layouts: &layouts,
             immediate_size: 0,
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -181,6 +191,12 @@ impl GpuEngine {
             cache: None,
         });
         let scene = scene::bind(&gpu, &scene_layout, &packed);
+        let aims = (aims_layout.zip(bound))
+            .map(|(layout, light)| light_paths::bind_aims(&gpu, &layout, world, light));
+        // SAFETY: it belongs to the path kernel.
+        let light = (kernel.light.as_ref())
+            .map(|k| unsafe { LightTracer::new(&gpu, world, k, &scene_layout, settings.size[0]) });
+        let light = light.transpose().map_err(unable)?;
         let params = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
             size: size_of::<Params>() as u64,
@@ -199,6 +215,8 @@ impl GpuEngine {
             kernel,
             pipeline,
             scene,
+            aims,
+            light,
             film_layout,
             params,
             tile: None,
@@ -356,6 +374,9 @@ impl GpuEngine {
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, &self.scene, &[]);
             pass.set_bind_group(1, &tile.bind_groups[place], &[]);
+            if let Some(aims) = &self.aims {
+                pass.set_bind_group(2, aims, &[]);
+            }
             pass.dispatch_workgroups(groups.end - groups.start, 1, 1);
         }
         self.gpu.queue.submit([encoder.finish()]);
@@ -508,6 +529,37 @@ impl Engine for GpuEngine {
             film.put_block(*rect, samples.clone(), |x, y| held[at(x, y)]);
         }
         self.read_back_seconds += begun.elapsed().as_secs_f64();
+        Ok(counters)
+    }
+
+    fn light_paths(&self) -> Option<SplatSetup> {
+        self.light.as_ref().map(LightTracer::setup)
+    }
+
+    fn trace_light(
+        &mut self,
+        film: &mut Film,
+        rects: &[Rect],
+        passes: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<Counters, EngineError> {
+        let Some(light) = &mut self.light else {
+            return Ok(Counters::default());
+        };
+        let mut splats = Vec::new();
+        let (gpu, scene, seed) = (&self.gpu, &self.scene, self.seed);
+        let counters = light.trace(
+            gpu,
+            scene,
+            seed,
+            passes.clone(),
+            stop,
+            SUBMISSION_SECONDS,
+            |s| {
+                splats.push(s);
+            },
+        )?;
+        film.put_passes(rects, passes, &splats);
         Ok(counters)
     }
 

@@ -5,6 +5,7 @@ mod engine;
 mod glances;
 mod held;
 mod instance;
+mod light_paths;
 pub mod pack;
 pub mod probe;
 #[cfg(test)]

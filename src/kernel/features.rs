@@ -1,9 +1,10 @@
 //! What the kernel of a scene needs, decided once from world and settings.
 
 use super::access::Access;
+use super::glances;
 use super::layout::ShapeKind;
+use super::light_paths::LightPaths;
 use super::literal::{float, vector};
-use super::{glances, images};
 use crate::film::{BLOCK, REPLICATES};
 use crate::scene::MaterialKind;
 use crate::settings::{Integrator, LightParts, Settings};
@@ -96,8 +97,10 @@ pub(super) struct Features {
     pub shadow_rays: u32,
     /// Diffuse bounces that meet a light by chance are weighed against light sampling.
     mis_cosine: bool,
-    /// Images of lights in mirror balls are sought.
-    pub images: bool,
+    /// What light that is met by chance is weighed against.
+    pub light_paths: Option<LightPaths>,
+    /// Materials are evaluated for given directions.
+    pub evaluates: bool,
     /// The last vertex at which glances look for lights; 0: none are sent.
     pub sight: u32,
     /// Strata along a pixel's side.
@@ -110,7 +113,12 @@ pub(super) struct Features {
 
 impl Features {
     /// Those of the kernel of `world` under `settings`, which reaches the scene's values by `access`.
-    pub fn new(world: &World, settings: &Settings, access: Access) -> Self {
+    pub fn new(
+        world: &World,
+        settings: &Settings,
+        access: Access,
+        light_paths: Option<LightPaths>,
+    ) -> Self {
         let used = || {
             world
                 .primitives
@@ -149,7 +157,8 @@ impl Features {
             shadow_rays: settings.shadow_rays,
             // What a cosine-distributed bounce finds of a light, cap sampling finds as well, unless it is near.
             mis_cosine: light_sampling && near_light::light_near_matt(world),
-            images: !images::of(world, settings, access).is_empty(),
+            light_paths,
+            evaluates: light_sampling,
             sight: glances::sight(world, settings, access),
             strata: settings.strata,
             last_depth,
@@ -171,11 +180,22 @@ impl Features {
             hidden_lights: false,
             shadow_rays: 1,
             mis_cosine: true,
-            images: probe.images,
+            light_paths: None,
+            evaluates: probe.glossy,
             sight: 0,
             strata: probe.strata,
             last_depth: 64,
             count_truncated: false,
+        }
+    }
+
+    /// Those of the kernel that traces light paths, which samples no lights.
+    pub fn of_light_paths(&self) -> Self {
+        Self {
+            light_sampling: false,
+            hidden_lights: false,
+            evaluates: true,
+            ..self.clone()
         }
     }
 
@@ -277,13 +297,8 @@ impl Features {
             "vec3f",
             vector(light_tree::LIGHT_COLORS),
         );
-        if self.images {
-            constant(
-                &mut s,
-                "MIRROR_BITS",
-                "u32",
-                format!("{}u", images::MIRROR_BITS),
-            );
+        if let Some(paths) = &self.light_paths {
+            paths.constants(&mut s);
         }
         s
     }
@@ -323,6 +338,10 @@ fn camera_constants(c: &WorldCamera, size: [u32; 2]) -> String {
     }
     let [w, h] = size.map(|n| float(f64::from(n) / 2.0));
     constant(&mut s, "CAMERA_CENTER", "vec2f", format!("vec2f({w}, {h})"));
+    constant(&mut s, "CAMERA_WIDTH", "u32", format!("{}u", size[0]));
+    let pixel = c.dx.length_squared();
+    constant(&mut s, "CAMERA_SCALE", "f32", float(1.0 / pixel));
+    constant(&mut s, "PIXEL_AREA", "f32", float(pixel));
     constant(&mut s, "CAMERA_MEDIUM", "u32", format!("{}u", c.medium));
     debug_assert_eq!(AIR, 0, "the kernel's comments say so");
     s

@@ -226,6 +226,18 @@ records! {
         trips: u32,
         opaque_two: u32,
     }
+    /// `LightParams` of light_path/trace.wgsl, which says what the fields mean.
+    LightParams {
+        first_pass: u32,
+        first_path: u32,
+        paths: u32,
+        each: u32,
+        invocations: u32,
+        room: u32,
+        seed: u32,
+        trips: u32,
+        opaque_two: u32,
+    }
 }
 
 impl Value for [u32; 2] {

@@ -5,8 +5,8 @@ mod access;
 mod emit;
 mod features;
 mod glances;
-mod images;
 pub(crate) mod layout;
+pub(crate) mod light_paths;
 mod literal;
 mod modules;
 mod preprocess;
@@ -21,8 +21,10 @@ pub(crate) use glances::{BRANCH_SHIFT, DIRECT_SHIFT};
 pub(crate) use streams::pilot_seed;
 
 use crate::settings::Settings;
+use crate::world::aims::Aims;
 use crate::world::{World, light_tree};
 use features::{Features, constant};
+use light_paths::LightPaths;
 use modules::Module;
 use std::fmt::Write as _;
 use trees::Parted;
@@ -39,25 +41,65 @@ pub struct Kernel {
     pub trips_per_sample: u64,
     /// The last vertex at which it looks for lights by extra camera rays, in pixels that the host marks; 0: it reads no marks.
     pub sight: u32,
+    /// The kernel that traces light paths, if the scene has any use for them.
+    pub light: Option<LightKernel>,
+}
+
+/// The kernel that traces light paths.
+#[derive(Debug, Clone)]
+pub struct LightKernel {
+    /// Its WGSL: entry point `trace`, 64 invocations a workgroup.
+    pub wgsl: String,
+    /// Where light paths are aimed.
+    pub(crate) aims: Aims,
+    /// Light paths of a pass, which goes with one sample of every pixel.
+    pub photons: u32,
+    /// The most loop trips that a light path can take of an invocation, without walks through trees.
+    pub trips_per_path: u64,
+    /// Whether the path kernel reads the aims from their buffer.
+    pub aims_bound: bool,
 }
 
 /// Composes the kernel of `world` under `settings`; `access` overrides the rule of [`Access::choose`].
 pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Kernel {
     let access = access.unwrap_or_else(|| Access::choose(world));
-    let features = Features::new(world, settings, access);
+    let aims = light_paths::aims(world, settings);
+    let paths = (aims.as_ref()).map(|aims| LightPaths::new(world, settings, access, aims));
+    let features = Features::new(world, settings, access, paths);
+    let light = aims.map(|aims| light_kernel(world, settings, &features, aims));
     let mut wgsl = String::from("// Made for one scene by etendue.\n");
     append(&mut wgsl, &features, &modules::of_path(&features));
     wgsl.push_str(&scene_text(world, settings, &features));
-    if features.images {
-        let images = images::of(world, settings, access);
-        wgsl = images::in_turns(&wgsl);
-        wgsl.push_str(&images::generate(world, &images));
+    if let Some(LightKernel { aims, photons, .. }) = light.as_ref().filter(|l| !l.aims_bound) {
+        wgsl.push_str(&light_paths::aims_in_text(world, aims, *photons));
     }
     Kernel {
         wgsl,
         access,
         trips_per_sample: trips::per_sample(world, settings, &features),
         sight: features.sight,
+        light,
+    }
+}
+
+/// The kernel that traces light paths, beside a path kernel with `features`.
+fn light_kernel(
+    world: &World,
+    settings: &Settings,
+    features: &Features,
+    aims: Aims,
+) -> LightKernel {
+    let own = features.of_light_paths();
+    let mut wgsl = String::from("// Made for one scene by etendue.\n");
+    append(&mut wgsl, &own, &modules::of_light_paths(&own));
+    wgsl.push_str(&scene_text(world, settings, &own));
+    wgsl.push_str(&emit::lights::medium(world));
+    LightKernel {
+        wgsl,
+        aims,
+        photons: light_paths::photons(settings.size),
+        trips_per_path: trips::per_light_path(world, settings, &own),
+        aims_bound: features.light_paths.as_ref().is_some_and(|p| !p.in_text),
     }
 }
 
@@ -106,8 +148,6 @@ fn append(s: &mut String, features: &Features, modules: &[Module]) {
 pub struct ProbeFeatures {
     /// Lights are sampled for glossy receivers, not for matt ones.
     pub glossy: bool,
-    /// Images of lights in mirror balls.
-    pub images: bool,
     /// Strata along a pixel's side.
     pub strata: u32,
 }
@@ -116,7 +156,6 @@ impl Default for ProbeFeatures {
     fn default() -> Self {
         Self {
             glossy: false,
-            images: false,
             strata: 1,
         }
     }
@@ -146,7 +185,8 @@ pub fn scene_probe_source(
     access: Access,
     body: &str,
 ) -> String {
-    let mut s = scene_text(world, settings, &Features::new(world, settings, access));
+    let features = Features::new(world, settings, access, None);
+    let mut s = scene_text(world, settings, &features);
     s.push_str(&probe_entry(body));
     s
 }

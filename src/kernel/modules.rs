@@ -62,7 +62,6 @@ modules! {
     PROBABILITY_ONE = "light/probability_one",
     PROBABILITY_BY_WEIGHT = "light/probability_by_weight",
     HIDDEN = "light/hidden",
-    MIRROR_BALL = "image/mirror_ball",
     PATH = "path",
     FILM = "film",
     SCATTER = "scatter",
@@ -77,8 +76,18 @@ modules! {
     TRIPS_COUNTED = "trips/counted",
     CONTROL_STRAIGHT = "control/straight",
     CONTROL_BRANCHING = "control/branching",
-    IMAGES_NONE = "image/none",
-    IMAGES_SOUGHT = "image/sought",
+    VERTEX = "vertex",
+    STORE_FINISHED = "store/finished",
+    STORE_UNFINISHED = "store/unfinished",
+    LIGHT_PATH_NONE = "light_path/none",
+    LIGHT_PATH_WEIGHED = "light_path/weighed",
+    LIGHT_PATH_AIMS = "light_path/aims",
+    LIGHT_PATH_AIMS_IN_BUFFER = "light_path/aims_in_buffer",
+    LIGHT_PATH_MATT = "light_path/matt",
+    LIGHT_PATH_GLOSSY = "light_path/glossy",
+    LIGHT_PATH_TRACE = "light_path/trace",
+    LIGHT_PATH_STRAIGHT = "light_path/straight",
+    LIGHT_PATH_BRANCHING = "light_path/branching",
 }
 
 /// How a material scatters.
@@ -103,19 +112,54 @@ pub(super) fn of_path(f: &Features) -> Vec<Module> {
         } else {
             GLANCE_NONE
         },
-        if f.images { IMAGES_SOUGHT } else { IMAGES_NONE },
+        VERTEX,
     ];
+    match &f.light_paths {
+        None => modules.push(LIGHT_PATH_NONE),
+        Some(paths) => {
+            modules.extend([LIGHT_PATH_WEIGHED, LIGHT_PATH_AIMS, scattering(f)]);
+            if !paths.in_text {
+                modules.push(LIGHT_PATH_AIMS_IN_BUFFER);
+            }
+        }
+    }
     modules.extend(match (f.light_sampling, f.shadow_rays) {
         (false, _) => vec![DIRECT_NONE],
         (true, 1) => vec![DIRECT_SAMPLED, DIRECT_ONE],
         (true, _) => vec![DIRECT_SAMPLED, DIRECT_SEVERAL],
     });
     modules.extend(match f.access {
-        Access::Baked => [TRIPS_UNLIMITED, CONTROL_STRAIGHT],
-        Access::Buffers => [TRIPS_UNLIMITED, CONTROL_BRANCHING],
-        Access::Tree => [TRIPS_COUNTED, CONTROL_BRANCHING],
+        Access::Baked => [TRIPS_UNLIMITED, STORE_FINISHED, CONTROL_STRAIGHT],
+        Access::Buffers => [TRIPS_UNLIMITED, STORE_FINISHED, CONTROL_BRANCHING],
+        Access::Tree => [TRIPS_COUNTED, STORE_UNFINISHED, CONTROL_BRANCHING],
     });
     modules
+}
+
+/// The loop of light paths, and what belongs to it alone.
+pub(super) fn of_light_paths(f: &Features) -> Vec<Module> {
+    let mut modules = vec![
+        LIGHT_PATH_TRACE,
+        LIGHT_PATH_AIMS,
+        LIGHT_PATH_AIMS_IN_BUFFER,
+        scattering(f),
+        VERTEX,
+    ];
+    modules.extend(match f.access {
+        Access::Baked => [TRIPS_UNLIMITED, LIGHT_PATH_STRAIGHT],
+        Access::Buffers => [TRIPS_UNLIMITED, LIGHT_PATH_BRANCHING],
+        Access::Tree => [TRIPS_COUNTED, LIGHT_PATH_BRANCHING],
+    });
+    modules
+}
+
+/// The densities of scattering that light paths are weighed by.
+fn scattering(f: &Features) -> Module {
+    if f.materials().any(|m| m.is_glossy()) {
+        LIGHT_PATH_GLOSSY
+    } else {
+        LIGHT_PATH_MATT
+    }
 }
 
 /// All that the path loop calls, and probes call without one. Templates of walks are not among it.
@@ -161,7 +205,6 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
     if f.light_sampling {
         modules.push(CHOSEN);
         modules.extend(match f.choice {
-            LightChoice::Only if f.images => vec![LIGHT_WEIGHT, PROBABILITY_ONE],
             LightChoice::Only => vec![PROBABILITY_ONE],
             LightChoice::Unrolled => vec![LIGHT_WEIGHT, PROBABILITY_BY_WEIGHT],
             LightChoice::Loop => vec![LIGHT_WEIGHT, PROBABILITY_BY_WEIGHT, CHOOSE_FROM_BUFFER],
@@ -170,9 +213,6 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
         if f.hidden_lights {
             modules.push(HIDDEN);
         }
-    }
-    if f.images {
-        modules.push(MIRROR_BALL);
     }
     match f.access {
         Access::Baked => {}

@@ -79,11 +79,19 @@ pub(super) fn per_sample(world: &World, settings: &Settings, features: &Features
     }
     // Every glance counts as a whole vertex: while one lane sends a glance, another may go through all the loops of a vertex.
     let turns = u64::from(features.last_depth) + u64::from(MAX_GLANCES * features.sight);
-    let trips = turns
+    turns
         .saturating_mul(at_vertex(world, settings, features.access, None))
-        .saturating_add(STRATA_LOOP + LOOPS_AROUND);
-    // If images are sought, the loop of vertices is inside another loop, which takes no more trips than the inner one.
-    trips + if features.images { turns } else { 0 }
+        .saturating_add(STRATA_LOOP + LOOPS_AROUND)
+}
+
+/// The loop trips that the choice of a light path's pair can take, in kernels whose pairs are as many as they may be.
+const PAIR_LOOP: u64 = 21;
+
+/// The most loop trips that one light path can take, without walks through trees.
+pub(super) fn per_light_path(world: &World, settings: &Settings, features: &Features) -> u64 {
+    u64::from(features.last_depth)
+        .saturating_mul(at_vertex(world, settings, features.access, None))
+        .saturating_add(PAIR_LOOP)
 }
 
 /// The loop trips that a kernel that counts subtracts before its first sample, and at each vertex.
@@ -94,6 +102,7 @@ pub(super) fn counted(
     parted: &Parted,
 ) -> [u64; 2] {
     let glances = u64::from(MAX_GLANCES * features.sight);
+    // Light paths begin at any vertex, and have no glances or strata.
     let start = glances + STRATA_LOOP + LOOPS_AROUND;
     [
         start,

@@ -36,6 +36,10 @@ pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
         ("shadow_rays", number(s.shadow_rays.into())),
         ("light", text(&light_name(s.light))),
         ("integrator", text(integrator_name(s.integrator))),
+        (
+            "light_paths",
+            text(if s.light_paths { "traced" } else { "off" }),
+        ),
         ("adapter", text(&p.adapters())),
         ("driver", text(&p.drivers())),
         // Goldens have none.

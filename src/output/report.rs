@@ -36,7 +36,9 @@ pub struct Report {
     pub seconds: Seconds,
     /// Camera paths of this run.
     pub paths: u64,
-    /// Rays of this run, shadow rays included.
+    /// Light paths of this run, from lights by way of mirrors and glass; 0 where there are none.
+    pub light_paths: u64,
+    /// Rays of this run, shadow rays and those of light paths included.
     pub rays: u64,
     /// Over the rendering time.
     pub paths_per_second: Option<f64>,
@@ -138,6 +140,7 @@ impl Report {
             stop_reason: run.stop_reason,
             seconds: run.seconds,
             paths: run.counters.paths,
+            light_paths: run.counters.light_paths,
             rays: run.counters.rays,
             paths_per_second: rate(run.counters.paths),
             rays_per_second: rate(run.counters.rays),
@@ -204,6 +207,7 @@ mod tests {
                 paths: 8,
                 rays: 20,
                 truncated: 1,
+                light_paths: 0,
                 nonfinite: 0,
                 first_nonfinite: None,
             },

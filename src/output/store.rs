@@ -8,6 +8,7 @@
 //! | `counts` | u64 (h, w) | samples of each pixel, without those left out |
 //! | `sums` | f64 (h, w, 4 replicates, 4) | R, G, B, and luminance², over finished blocks |
 //! | `partial` | f32 (h, w, 4 replicates, 4) | the same over an unfinished block; only there while one is |
+//! | `splats` | u64 (h, w, 4 replicates, 4) | light that light paths have brought: R, G, B, and luminance² of each splat, in steps; only there if the header has `splats` |
 //! | `left_out` | u64 (n, 2 + 4 replicates) | pixels x, y with samples that were not finite, and how many of each replicate; only there if there are any |
 //!
 //! h and w are those of `bounds`. `mean` and `error` follow from the others, and are there for readers in other languages: this
@@ -20,6 +21,7 @@ use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use crate::film::coverage::{Coverage, Rect};
 use crate::film::pilot::Pilot;
+use crate::film::splats::SplatSetup;
 use crate::film::{BLOCK, Film, REPLICATES, Reach, Sums};
 use crate::provenance::Provenance;
 use crate::scene::LARGEST_STRATA;
@@ -58,11 +60,23 @@ struct Header {
     /// Whether there is an array `reached`.
     #[serde(default)]
     reached: bool,
+    /// What the array `splats` is of; only there if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    splats: Option<SplatHeader>,
     /// What steers an adaptive film; only there in one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pilot: Option<Pilot>,
     coverage: Coverage,
     provenance: Provenance,
+}
+
+/// Passes of light paths.
+#[derive(Serialize, Deserialize)]
+struct SplatHeader {
+    #[serde(flatten)]
+    setup: SplatSetup,
+    /// Which pixels have which passes.
+    coverage: Coverage,
 }
 
 /// As much of [`Header`] as every version has.
@@ -88,6 +102,10 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         developed: true,
         left_out: left_out.len() as u64,
         reached: !film.reached().is_empty(),
+        splats: film.splats().map(|s| SplatHeader {
+            setup: s.setup,
+            coverage: s.coverage.clone(),
+        }),
         pilot: film.pilot.clone(),
         coverage: film.coverage.clone(),
         provenance: provenance.clone(),
@@ -143,8 +161,16 @@ pub fn save(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), Fil
         arrays.push(Array {
             name: "partial",
             descr: "<f4".into(),
-            shape: per_replicate,
+            shape: per_replicate.clone(),
             data: bytemuck::cast_slice(film.partial()),
+        });
+    }
+    if let Some(splats) = film.splats() {
+        arrays.push(Array {
+            name: "splats",
+            descr: "<u8".into(),
+            shape: per_replicate,
+            data: bytemuck::cast_slice(splats.sums()),
         });
     }
     if !left_out.is_empty() {
@@ -271,6 +297,10 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     } else {
         Vec::new()
     };
+    let splats: Option<Vec<[[u64; 4]; REPLICATES]>> = match &header.splats {
+        Some(_) => Some(reader.array("splats", "<u8", &per_replicate, pixels)?),
+        None => None,
+    };
     let left_out: Vec<[u64; 2 + REPLICATES]> = if header.left_out > 0 {
         let shape = [header.left_out, 2 + REPLICATES as u64];
         reader.array("left_out", "<u8", &shape, header.left_out)?
@@ -319,6 +349,9 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     );
     film.pilot = header.pilot;
     film.set_reached(reached);
+    if let Some((SplatHeader { setup, coverage }, sums)) = header.splats.zip(splats) {
+        film.set_splats(setup, coverage, sums);
+    }
     for [x, y, samples @ ..] in left_out {
         film.leave_out(x as u32, y as u32, samples);
     }
@@ -363,6 +396,7 @@ fn check_header(header: &Header) -> Result<(), String> {
         ref pilot,
         ref coverage,
         ref provenance,
+        ref splats,
         ..
     } = *header;
     if size.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
@@ -390,6 +424,22 @@ fn check_header(header: &Header) -> Result<(), String> {
     if let Some(pilot) = pilot {
         pilot.check(bounds)?;
     }
+    check_coverage(coverage, bounds)?;
+    if let Some(SplatHeader { setup, coverage }) = splats {
+        if setup.paths == 0 || !(setup.scale > 0.0 && setup.scale.is_finite()) {
+            return Err(format!(
+                "it has passes of {} light paths with a scale of {}, but both must be positive",
+                setup.paths, setup.scale
+            ));
+        }
+        check_coverage(coverage, bounds)?;
+        // No pixel twice.
+        counts(coverage, bounds)?;
+    }
+    Ok(())
+}
+
+fn check_coverage(coverage: &Coverage, bounds: Rect) -> Result<(), String> {
     for (rect, ranges) in coverage.cells() {
         if rect.area() == 0 || rect.intersection(&bounds) != Some(rect) {
             return Err(format!(

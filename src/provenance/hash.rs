@@ -80,6 +80,8 @@ impl Hasher {
             shadow_rays: _,
             light,
             integrator,
+            // It decides how light is found, and not which.
+            light_paths: _,
         } = settings;
         for n in [size[0], size[1], *max_depth] {
             self.0.update(n.to_le_bytes());

@@ -126,6 +126,7 @@ mod tests {
             radiance: DVec3::splat(emitted),
             emitted: DVec3::splat(emitted),
             face: 1,
+            medium: Some(0),
             line: 0,
         }
     }

@@ -313,6 +313,7 @@ impl Facts {
             shadow_rays: Some(self.shadow_rays),
             light: Some(self.light),
             integrator: Some(self.integrator),
+            light_paths: None,
         };
         Settings::resolve(scene, &overrides)
     }

@@ -4,8 +4,9 @@ use super::Error;
 use crate::engine::MAX_TILE_PIXELS;
 use std::fs;
 
-/// Bytes per pixel of the film: four replicates, each of four f64 sums and four f32 sums of the unfinished block.
-const FILM_BYTES: u64 = 128 + 64;
+/// Bytes per pixel of the film: four replicates, each of four f64 sums and four f32 sums of the unfinished
+/// block, and of four sums of splats and a count of passes.
+const FILM_BYTES: u64 = 128 + 64 + 144;
 
 /// Bytes per pixel while pictures are written: nine f32 channels and a count.
 const OUTPUT_BYTES: u64 = 40;

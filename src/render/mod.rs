@@ -127,6 +127,9 @@ pub struct Options {
     pub light: Option<LightParts>,
     /// How light travels; the whole rendering equation if not given.
     pub integrator: Option<Integrator>,
+    /// Whether light that comes by way of mirrors and glass is also traced from the lights, where the scene has a use for that; it is if
+    /// not given. Not on the CPU reference.
+    pub light_paths: Option<bool>,
 }
 
 impl Options {
@@ -188,6 +191,7 @@ impl Options {
             shadow_rays: self.shadow_rays,
             light: self.light,
             integrator: self.integrator,
+            light_paths: self.light_paths,
         }
     }
 
@@ -279,12 +283,13 @@ pub fn render_with(
     let bounds = plan::bounds(&regions);
     memory::check(bounds.area())?;
     let ordered = Canonical::new(&scene);
-    let before = Provenance::of(&ordered, text, &settings);
+    let mut before = Provenance::of(&ordered, text, &settings);
     let world = World::of(&ordered, settings.size);
     let mut film = Film::new(settings.size, bounds, settings.strata);
     film.pilot = options.adaptive.then(|| Pilot::new(&regions));
     let adapter = options.adapter.as_deref();
     let mut chosen = backend::choose(options.backend, adapter, &world, &settings, |_| ())?;
+    before.settings.light_paths = chosen.engine.light_paths().is_some();
     let ends = options.time.is_some() || options.error.is_some();
     let unless_told = if ends { MAX_SAMPLES } else { DEFAULT_SPP };
     let on_cpu = chosen.engine.device().backend == "cpu";

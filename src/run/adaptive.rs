@@ -102,6 +102,9 @@ impl Run<'_> {
                 wanted = self.counts(&tiles, next);
             }
             let learning = self.pace.is_none();
+            if !self.trace_light(0..next, &mut after)? {
+                return Ok(StopReason::Interrupted);
+            }
             for &tile in &job.tiles {
                 loop {
                     let parts = self.in_time(self.lacking(tile, &tiles, &wanted));

@@ -66,6 +66,7 @@ fn upward(radius: f64) -> WorldLight {
         radiance: DVec3::ONE,
         emitted: DVec3::ONE,
         face: 0,
+        medium: Some(0),
         line: 0,
     }
 }

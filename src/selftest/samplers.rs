@@ -174,6 +174,7 @@ fn cap(b: &Backend) -> Result<Measure, Trouble> {
             radiance: DVec3::ONE,
             emitted: DVec3::ONE,
             face: 0,
+            medium: Some(0),
             line: 0,
         };
         let point = v(x[2], x[3], 0.0);

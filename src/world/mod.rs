@@ -14,6 +14,7 @@
 //!   (n at the eye / n at the light)². [`WorldLight::radiance`] contains that factor, and the path carries nothing. The
 //!   exception is a light that pokes through the surface of a solid: [`World::light_scales`].
 
+pub(crate) mod aims;
 mod faces;
 mod geometry;
 pub(crate) mod light_tree;
@@ -87,6 +88,8 @@ pub struct WorldLight {
     pub emitted: DVec3,
     /// Identity of its plane, shared with flat faces that coincide.
     pub face: u32,
+    /// The dielectric solid that it shines in; `None` if the surface of one may cut it.
+    pub medium: Option<u32>,
     /// Line in the scene file.
     pub line: usize,
 }
@@ -181,6 +184,7 @@ impl World {
                 radiance: l.radiance,
                 emitted: l.radiance,
                 face: 0,
+                medium: None,
                 line: l.line,
             })
             .collect();
@@ -193,7 +197,10 @@ impl World {
         faces::name(&mut lights, &mut primitives);
         let medium = media.at(eye);
         let scales = media.light_scales(medium);
-        let shines_in: Option<Vec<u32>> = lights.iter().map(|l| media.of_light(l)).collect();
+        for l in &mut lights {
+            l.medium = media.of_light(l);
+        }
+        let shines_in: Option<Vec<u32>> = lights.iter().map(|l| l.medium).collect();
         for (l, &m) in lights.iter_mut().zip(shines_in.iter().flatten()) {
             l.radiance *= scales[m as usize];
         }

@@ -47,6 +47,7 @@ pub fn provenance(size: [u32; 2]) -> Provenance {
             shadow_rays: 1,
             light: LightParts::ALL,
             integrator: Integrator::Path,
+            light_paths: true,
         },
         samples: 0.0,
         replicates: 0,

@@ -18,6 +18,7 @@ fn test_light() -> WorldLight {
         radiance: DVec3::ONE,
         emitted: DVec3::ONE,
         face: 0,
+        medium: Some(0),
         line: 0,
     }
 }

@@ -2,7 +2,6 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-mod images;
 mod lights;
 
 use etendue::gpu::probe::{UNWRITTEN, Uniform, Values, run};

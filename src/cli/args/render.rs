@@ -96,6 +96,14 @@ pub struct RenderArgs {
     /// path is full path tracing; whitted follows mirrors and glass, with only direct light on other surfaces [default: path]
     #[arg(long, value_enum, value_name = "NAME", help_heading = "What to render")]
     pub integrator: Option<IntegratorName>,
+    /// Whether light that comes by way of mirrors and glass is also traced from the lights [default: auto, where the scene has a use for it]
+    #[arg(
+        long,
+        value_enum,
+        value_name = "auto|off",
+        help_heading = "What to render"
+    )]
+    pub light_paths: Option<Switch>,
     /// Light samples per path vertex, over all lights together [default: chosen from the scene]
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, MAX_SHADOW_RAYS.into()), allow_hyphen_values = true,
           help_heading = "What to render")]
@@ -131,6 +139,15 @@ pub struct RenderArgs {
     pub talk: Talk,
 }
 
+/// `--light-paths`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// Traced where the scene has a use for them.
+    Auto,
+    /// Not traced.
+    Off,
+}
+
 /// `--integrator`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum IntegratorName {
@@ -154,6 +171,7 @@ impl RenderArgs {
                 IntegratorName::Path => Integrator::Path,
                 IntegratorName::Whitted => Integrator::Whitted,
             }),
+            light_paths: self.light_paths.map(|switch| switch == Switch::Auto),
         }
     }
 }

@@ -203,8 +203,8 @@ fn a_call_with_several_parts_gives_the_bits_of_separate_calls() {
         let access = engine.kernel().access;
         let mut wanted = Film::new([16, 12], TILE, 2);
         let mut counted = Counters::default();
-        for Part { rect, samples } in &alone {
-            let one = engine.render(&mut wanted, *rect, samples.clone(), &stop);
+        for part in &alone {
+            let one = engine.render_parts(&mut wanted, part.rect, &[part.clone()], &stop);
             counted += one.expect("samples");
         }
         // What is in the textures serves the next call; or it has gone, and comes from the film.

@@ -4,7 +4,7 @@ use super::super::features::{Features, LightChoice};
 use super::super::layout::DiskLight;
 use super::super::literal::float;
 use crate::settings::LightParts;
-use crate::world::World;
+use crate::world::{AIR, World};
 use std::fmt::Write as _;
 
 /// `choose_light`, which chooses one light with a probability in proportion to its weight. Empty if a module of the shaders has it.
@@ -14,15 +14,9 @@ pub(in crate::kernel) fn choose(world: &World, features: &Features) -> String {
         LightChoice::Loop | LightChoice::Tree => String::new(),
         LightChoice::Only => {
             let light = DiskLight::of(&world.lights[0]).constructor();
-            // The choice of an image compares with the light's own weight.
-            let weight = if features.images {
-                "light_weight(light, p, to)"
-            } else {
-                "1.0"
-            };
             format!(
                 "{HEAD}    let light = {light};
-    return Chosen(light, 0u, cap_of(light, p), 1.0, {weight});
+    return Chosen(light, 0u, cap_of(light, p), 1.0, 1.0);
 }}
 
 "
@@ -104,4 +98,16 @@ pub(in crate::kernel) fn scale(world: &World) -> String {
         first = last + 1;
     }
     s + "    return scale;\n}\n\n"
+}
+
+/// `light_medium`: the solid that a light shines in.
+pub(in crate::kernel) fn medium(world: &World) -> String {
+    let mut s = "fn light_medium(light: u32) -> u32 {\n    var medium = AIR;\n"
+        .replace("AIR", &format!("{AIR}u"));
+    for (i, l) in world.lights.iter().enumerate() {
+        if let Some(m) = l.medium.filter(|m| *m != AIR) {
+            let _ = writeln!(s, "    medium = select(medium, {m}u, light == {i}u);");
+        }
+    }
+    s + "    return medium;\n}\n\n"
 }

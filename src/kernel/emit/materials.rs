@@ -5,7 +5,7 @@ use super::super::features::Features;
 use crate::scene::MaterialKind;
 use std::fmt::Write as _;
 
-/// `sample_bsdf`, and `evaluate_bsdf` if lights are sampled.
+/// `sample_bsdf`, and `evaluate_bsdf` if it is called.
 pub(in crate::kernel) fn dispatch(features: &Features) -> String {
     let mut s = String::new();
     let all: Vec<MaterialKind> = features.materials().collect();
@@ -17,7 +17,7 @@ pub(in crate::kernel) fn dispatch(features: &Features) -> String {
         "Scattered",
         &all,
     ));
-    if features.light_sampling {
+    if features.evaluates {
         let scattering: Vec<MaterialKind> = all.into_iter().filter(|m| !m.is_specular()).collect();
         s.push_str(&over(
             features,
