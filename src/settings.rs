@@ -202,6 +202,12 @@ impl Settings {
         self.integrator == Integrator::Path && self.light.indirect && self.max_depth > 2
     }
 
+    /// Whether light paths may be traced in a picture of `scene`: something must be specular.
+    pub(crate) fn may_trace_light(&self, scene: &Scene) -> bool {
+        let specular = |p: &Primitive| scene.materials[p.material].bsdf.kind().is_specular();
+        self.light_paths && self.finds_light_by_chance() && scene.primitives.iter().any(specular)
+    }
+
     /// Whether light can arrive that has been scattered by a surface.
     fn keeps_scattered(&self) -> bool {
         (self.light.direct && self.max_depth > 1) || (self.light.indirect && self.max_depth > 2)

@@ -59,7 +59,18 @@ fn both(scene: &Scene, size: [u32; 2], access: Access) -> Option<String> {
         ..Overrides::default()
     };
     let settings = Settings::resolve(scene, &flags);
-    let on_gpu = fault(&mut gpu(scene, &settings, Some(access)), &settings, 16);
+    // A pass has as many light paths as a large picture needs, so these are traced for a small one.
+    let small = Settings {
+        size: size.map(|n| n.min(48)),
+        ..settings.clone()
+    };
+    let by_chance = Settings {
+        light_paths: false,
+        ..settings.clone()
+    };
+    let on_gpu = [small, by_chance]
+        .iter()
+        .find_map(|settings| fault(&mut gpu(scene, settings, Some(access)), settings, 16));
     let on_cpu = || {
         fault(
             &mut cpu(scene, &settings, Estimator::LightSampling),

@@ -82,6 +82,9 @@ fn fitting(paths: &[PathBuf]) -> Result<Vec<(&Path, Outline)>, Failure> {
                 .map_err(|e| refused(other, path, &e))?;
             MergeError::overlap(&its.coverage, &new.coverage)
                 .map_err(|e| refused(other, path, &e.to_string()))?;
+            if let (Some(a), Some(b)) = (&its.passes, &new.passes) {
+                MergeError::passes(a, b).map_err(|e| refused(other, path, &e.to_string()))?;
+            }
         }
         films.push((path, new));
     }
@@ -90,7 +93,8 @@ fn fitting(paths: &[PathBuf]) -> Result<Vec<(&Path, Outline)>, Failure> {
         .iter()
         .fold(films[0].1.bounds, |sum, (_, film)| sum.union(&film.bounds));
     let largest = films.iter().map(|(_, film)| film.bounds.area()).max();
-    memory::check(sum.area() + largest.unwrap_or(0))?;
+    let light_paths = films[0].1.passes.is_some();
+    memory::check(sum.area() + largest.unwrap_or(0), light_paths)?;
     Ok(films)
 }
 

@@ -135,7 +135,7 @@ fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
     let engine = |world: &World, settings: &Settings| -> Result<(Box<dyn Engine>, u64), Trouble> {
         let [width, height] = settings.size.map(u64::from);
         let adapter = args.adapter.as_deref();
-        let chosen = memory::check(width * height)
+        let chosen = memory::check(width * height, true)
             .and_then(|()| backend::choose(args.backend, adapter, world, settings, |_| ()));
         match chosen {
             Ok(chosen) => Ok((chosen.engine, chosen.tile_pixels)),

@@ -83,7 +83,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             (film, held)
         }
         _ => {
-            memory::check(bounds.area())?;
+            memory::check(bounds.area(), settings.may_trace_light(&scene))?;
             let mut film = Film::new(settings.size, bounds, settings.strata);
             film.pilot = args.adaptive.then(|| Pilot::new(&regions));
             (film, new)

@@ -53,6 +53,14 @@ impl MergeError {
             None => Ok(()),
         }
     }
+
+    /// Refuses passes that would count twice.
+    pub fn passes(into: &Coverage, other: &Coverage) -> Result<(), Self> {
+        match into.common(other) {
+            Some((rect, passes)) => Err(Self::Passes { rect, passes }),
+            None => Ok(()),
+        }
+    }
 }
 
 /// Adds `other` to `into`, whose bounds grow to hold both. After an error `into` is unchanged.
@@ -78,9 +86,7 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
     match (&into.splats, &other.splats) {
         (None, None) => {}
         (Some(a), Some(b)) if a.setup == b.setup => {
-            if let Some((rect, passes)) = a.coverage.common(&b.coverage) {
-                return Err(MergeError::Passes { rect, passes });
-            }
+            MergeError::passes(&a.coverage, &b.coverage)?;
         }
         _ => return Err(MergeError::LightPaths),
     }

@@ -14,8 +14,8 @@ use std::fmt::Write as _;
 /// it was 0.9 times as high, with 32 0.9 to 1.0 times. Fewer are better only while other noise remains.
 const PIXELS_A_PATH: u32 = 8;
 
-/// The fewest light paths of a pass.
-const FEWEST: u32 = 64;
+/// The fewest and the most light paths of a pass. A small region needs all of them, however large the picture is.
+const LIMITS: [u32; 2] = [64, 1 << 18];
 
 /// The most pairs that stand in a kernel's text. Every turn of the path loop looks a pair up, and a load from a buffer would cost it more
 /// than so many selections.
@@ -23,10 +23,9 @@ const MOST_IN_TEXT: usize = 24;
 
 /// Light paths of a pass, which goes with one sample of every pixel of a picture of this size.
 pub(super) fn photons(size: [u32; 2]) -> u32 {
-    size[0]
-        .saturating_mul(size[1])
-        .div_ceil(PIXELS_A_PATH)
-        .max(FEWEST)
+    let [fewest, most] = LIMITS;
+    let wanted = size[0].saturating_mul(size[1]).div_ceil(PIXELS_A_PATH);
+    wanted.clamp(fewest, most)
 }
 
 /// The pairs of lights and specular surfaces, if the picture has light paths. The shortest has two vertices, and the light is a third.

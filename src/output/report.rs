@@ -238,6 +238,7 @@ mod tests {
             "relative_error": 0.0,
             "relative_error_uncertainty": 0.0,
             "relative_error_doubt": null,
+            "light_paths": 0,
             "mean_luminance": 0.5,
             "truncated_paths": 1,
             "nonfinite_samples": 0,
@@ -256,6 +257,7 @@ mod tests {
         for key in [
             "relative_error",
             "relative_error_uncertainty",
+            "light_paths",
             "mean_luminance",
             "paths_per_second",
             "rays_per_second",

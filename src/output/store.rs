@@ -219,6 +219,8 @@ pub struct Outline {
     pub bounds: Rect,
     /// Which pixels have had which samples.
     pub coverage: Coverage,
+    /// Which pixels have had which passes of light paths, in a film that has any.
+    pub passes: Option<Coverage>,
     /// Where it comes from.
     pub provenance: Provenance,
 }
@@ -230,6 +232,7 @@ pub fn outline(path: &Path) -> Result<Outline, FileError> {
         adaptive: header.pilot.is_some(),
         bounds: header.bounds,
         coverage: header.coverage,
+        passes: header.splats.map(|s| s.coverage),
         provenance: header.provenance,
     })
 }

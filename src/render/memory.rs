@@ -4,9 +4,11 @@ use super::Error;
 use crate::engine::MAX_TILE_PIXELS;
 use std::fs;
 
-/// Bytes per pixel of the film: four replicates, each of four f64 sums and four f32 sums of the unfinished
-/// block, and of four sums of splats and a count of passes.
-const FILM_BYTES: u64 = 128 + 64 + 144;
+/// Bytes per pixel of the film: four replicates, each of four f64 sums and four f32 sums of the unfinished block.
+const FILM_BYTES: u64 = 128 + 64;
+
+/// The same for light paths: four replicates, each of four sums of splats and a count of passes.
+const SPLAT_BYTES: u64 = 144;
 
 /// Bytes per pixel while pictures are written: nine f32 channels and a count.
 const OUTPUT_BYTES: u64 = 40;
@@ -15,19 +17,20 @@ const OUTPUT_BYTES: u64 = 40;
 /// the buffer that is read back, counters, and their copies.
 const TILE_BYTES: u64 = 384;
 
-fn needed(pixels: u64) -> u64 {
-    let film = pixels.saturating_mul(FILM_BYTES + OUTPUT_BYTES);
+fn needed(pixels: u64, light_paths: bool) -> u64 {
+    let splats = if light_paths { SPLAT_BYTES } else { 0 };
+    let film = pixels.saturating_mul(FILM_BYTES + splats + OUTPUT_BYTES);
     film.saturating_add(pixels.min(MAX_TILE_PIXELS) * TILE_BYTES)
 }
 
-/// Refuses a film of `pixels` pixels that does not fit into memory.
-pub fn check(pixels: u64) -> Result<(), Error> {
+/// Refuses a film of `pixels` pixels that does not fit into memory, with room for light paths or without.
+pub fn check(pixels: u64, light_paths: bool) -> Result<(), Error> {
     match available() {
-        Some(have) if needed(pixels) > have => Err(Error::Input(format!(
+        Some(have) if needed(pixels, light_paths) > have => Err(Error::Input(format!(
             "a film of {:.1} million pixels needs {:.1} GB of memory, but only {:.1} GB are free; use a smaller --size, \
                  or render one --region at a time",
             pixels as f64 / 1e6,
-            needed(pixels) as f64 / 1e9,
+            needed(pixels, light_paths) as f64 / 1e9,
             have as f64 / 1e9,
         ))),
         _ => Ok(()),
@@ -77,10 +80,12 @@ mod tests {
 
     #[test]
     fn pictures_too_large_for_memory_are_refused() {
-        check(512 * 384).unwrap();
+        check(512 * 384, true).unwrap();
         if available().is_some() {
-            let message = check(1 << 40).unwrap_err().to_string();
+            let message = check(1 << 40, false).unwrap_err().to_string();
             assert!(message.contains("255087.1 GB"), "{message}");
+            let message = check(1 << 40, true).unwrap_err().to_string();
+            assert!(message.contains("413416.8 GB"), "{message}");
         }
     }
 

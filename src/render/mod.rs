@@ -281,7 +281,7 @@ pub fn render_with(
     let settings = Settings::resolve(&scene, &options.overrides());
     let regions = options.rects(settings.size)?;
     let bounds = plan::bounds(&regions);
-    memory::check(bounds.area())?;
+    memory::check(bounds.area(), settings.may_trace_light(&scene))?;
     let ordered = Canonical::new(&scene);
     let mut before = Provenance::of(&ordered, text, &settings);
     let world = World::of(&ordered, settings.size);

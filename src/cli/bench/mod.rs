@@ -143,7 +143,7 @@ impl Bench<'_> {
         let settings = Settings::resolve(scene, &self.args.overrides());
         let area = u64::from(settings.size[0]) * u64::from(settings.size[1]);
         // The reference, and the picture that is compared with it.
-        memory::check(2 * area)?;
+        memory::check(2 * area, true)?;
         let hash = scene_hash(scene, &settings);
         // Read the given reference first: it may be refused, and making engines takes time.
         let given = match &self.args.reference {

@@ -53,7 +53,10 @@ impl Bench<'_> {
             let scene =
                 parse::parse_str(Path::new(setting.scene), setting.text).map_err(Failure::Scene)?;
             let settings = Settings::resolve(&scene, &setting.overrides(&self.args.overrides()));
-            memory::check(u64::from(settings.size[0]) * u64::from(settings.size[1]))?;
+            memory::check(
+                u64::from(settings.size[0]) * u64::from(settings.size[1]),
+                false,
+            )?;
             let world = World::new(&scene, settings.size);
             for kind in self.engines(&world) {
                 let mut contender = self.contender(kind, &world, &settings)?;

@@ -21,7 +21,7 @@ impl Bench<'_> {
         };
         let scene = Series::Spheres.scene(1).map_err(Failure::Scene)?;
         let settings = Settings::resolve(&scene, &self.args.overrides());
-        memory::check(settings.size.map(u64::from).iter().product())?;
+        memory::check(settings.size.map(u64::from).iter().product(), false)?;
         let engines = self.scaling_engines(&World::new(&scene, settings.size));
         for (i, series) in Series::ALL.into_iter().enumerate() {
             let mut scaling = Scaling::new(series, &engines);
