@@ -130,12 +130,18 @@ mod tests {
         );
         // What is told to programs is not extrapolated.
         let measured = looked(hour).measured(&film, &tally, true);
-        assert_eq!((measured.relative_error, measured.samples), (Some(0.2), Some(64.0)));
+        assert_eq!(
+            (measured.relative_error, measured.samples),
+            (Some(0.2), Some(64.0))
+        );
         for mut looks in [looked(Duration::ZERO), Looks::default()] {
             let error = looks.error(&film, &tally).and_then(|e| describe(&e));
             assert_eq!(error.as_deref(), Some("relative error 0 %"));
             let measured = looks.measured(&film, &tally, true);
-            assert_eq!((measured.relative_error, measured.samples), (Some(0.0), Some(256.0)));
+            assert_eq!(
+                (measured.relative_error, measured.samples),
+                (Some(0.0), Some(256.0))
+            );
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod adapters;
 mod args;
+mod audience;
 mod bench;
 mod check;
 mod compare;
@@ -28,6 +29,7 @@ mod signals;
 mod stages;
 mod time_left;
 mod values;
+mod watch;
 
 use crate::files::FileError;
 use args::{Cli, Command};
@@ -66,6 +68,7 @@ pub fn main() -> ExitCode {
         Command::Regress(args) => regress::regress(&args),
         Command::MakeScene(args) => make_scene::make_scene(&args),
         Command::Bench(args) => bench::bench(&args),
+        Command::Watch(args) => watch::watch(&args),
         Command::Plot(args) => plot::plot(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),

@@ -28,7 +28,11 @@ pub fn plot(args: &PlotArgs) -> Result<(), Failure> {
         files.writes("--output", path)?;
     }
     let read = |path| Ok::<Log, FileError>(log::read(path)?);
-    let logs: Vec<Log> = args.logs.iter().map(|p| read(p)).collect::<Result<_, _>>()?;
+    let logs: Vec<Log> = args
+        .logs
+        .iter()
+        .map(|p| read(p))
+        .collect::<Result<_, _>>()?;
     let mut curves = Vec::new();
     for (path, log) in args.logs.iter().zip(&logs) {
         if log.errors.is_empty() {
@@ -114,7 +118,11 @@ fn thin(points: &[[f64; 3]]) -> Vec<[f64; 3]> {
         }
     }
     // Two marks at the end would be one.
-    if kept.len() > 1 && kept.last().is_some_and(|k| (last[0] / k[0]).ln() < 0.5 * step) {
+    if kept.len() > 1
+        && kept
+            .last()
+            .is_some_and(|k| (last[0] / k[0]).ln() < 0.5 * step)
+    {
         kept.pop();
     }
     kept.push(*last);

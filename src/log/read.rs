@@ -179,11 +179,7 @@ mod tests {
         assert_eq!(log.ended.as_deref(), Some("spp"));
         assert!(log.warnings.is_empty(), "those of the run before");
         // Another picture begins anew.
-        let log = write(
-            &[&lines[..], &[start("other", 0.0)]].concat(),
-            "",
-        )
-        .unwrap();
+        let log = write(&[&lines[..], &[start("other", 0.0)]].concat(), "").unwrap();
         assert!(log.errors.is_empty() && log.ended.is_none());
         assert_eq!(write(&[], "").unwrap(), Log::default());
     }

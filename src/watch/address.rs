@@ -25,7 +25,8 @@ impl FromStr for Address {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        const RULE: &str = "expected an address and a port, such as 127.0.0.1:8080, [::1]:8080 or localhost:8080";
+        const RULE: &str =
+            "expected an address and a port, such as 127.0.0.1:8080, [::1]:8080 or localhost:8080";
         let (host, port) = text.rsplit_once(':').ok_or(RULE)?;
         // Without this, "+80" would be a port.
         let digits = !port.is_empty() && port.bytes().all(|b| b.is_ascii_digit());

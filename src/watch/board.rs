@@ -1,10 +1,10 @@
 //! What the page shows: written by who renders, read by the server.
 
-use super::snapshot::Snapshot;
-use crate::log::{Level, Message, Point, Target};
+use super::snapshot::Picture;
+use crate::log::{Level, Message, Point, Start, Target};
 use crate::provenance::Provenance;
 use serde::Serialize;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
@@ -45,6 +45,7 @@ impl Board {
             name: name.into(),
             changes: self.changes.clone(),
             wanted: AtomicBool::new(false),
+            spent: AtomicU64::new(0),
             state: Mutex::new(State::new(about)),
         });
         runs.push(run.clone());
@@ -79,6 +80,8 @@ pub struct Run {
     changes: watch::Sender<u64>,
     /// Whether someone waits for a newer snapshot.
     wanted: AtomicBool,
+    /// Microseconds that the server has spent on pictures.
+    spent: AtomicU64,
     state: Mutex<State>,
 }
 
@@ -104,6 +107,23 @@ pub struct About {
     /// Provenance, for the page's last part.
     #[serde(skip)]
     pub provenance: Option<Arc<Provenance>>,
+}
+
+impl About {
+    /// Of a run that begins so.
+    pub fn of(start: &Start, live: bool, provenance: Option<Arc<Provenance>>) -> Self {
+        Self {
+            title: start.title.clone().unwrap_or_else(|| start.scene.clone()),
+            file: start.film.clone().unwrap_or_else(|| start.scene.clone()),
+            size: start.resolution,
+            regions: start.regions.clone(),
+            adapter: start.adapter.brief(),
+            target: start.target,
+            seconds_before: start.held.seconds,
+            live,
+            provenance,
+        }
+    }
 }
 
 /// A change since a [`Cursor`], as the page gets it.
@@ -146,7 +166,7 @@ struct State {
     ended: Option<String>,
     problem: Option<String>,
     saved: Option<f64>,
-    picture: Option<Arc<Snapshot>>,
+    picture: Option<Picture>,
     /// Counts snapshots.
     version: u64,
     /// When a picture was last asked for, and the newest version that was given.
@@ -211,11 +231,24 @@ impl Run {
         });
     }
 
-    /// Its curve as a log has it: seconds, relative error, uncertainty.
-    pub fn set_curve(&self, curve: &[[f64; 3]]) {
+    /// All of it, as a file tells it. The curve has seconds over all runs, samples, relative error and its uncertainty.
+    pub fn set(
+        &self,
+        about: About,
+        now: Point,
+        curve: Vec<[f64; 4]>,
+        messages: Vec<Message>,
+        ended: Option<String>,
+    ) {
         self.change(|s| {
             s.epoch += 1;
-            s.curve = curve.iter().map(|&[t, e, u]| [t, 0.0, e, u]).collect();
+            s.about = about;
+            s.now = Some(now);
+            s.curve = curve;
+            s.messages = messages;
+            s.messages.truncate(MOST_MESSAGES);
+            s.ended = ended;
+            s.problem = None;
         });
     }
 
@@ -232,16 +265,6 @@ impl Run {
         });
     }
 
-    /// Replaces all messages.
-    pub fn set_messages(&self, messages: Vec<Message>) {
-        self.change(|s| {
-            if s.messages != messages {
-                s.messages = messages;
-                s.epoch += 1;
-            }
-        });
-    }
-
     /// It has ended, for this reason.
     pub fn end(&self, reason: Option<String>) {
         self.change(|s| s.ended = reason);
@@ -249,14 +272,18 @@ impl Run {
 
     /// Why its file can't be read; the last picture stays.
     pub fn problem(&self, problem: Option<String>) {
-        self.change(|s| s.problem = problem);
+        // It is said again and again, and is news only once.
+        if locked(&self.state).problem != problem {
+            self.change(|s| s.problem = problem);
+        }
     }
 
-    /// Another snapshot. `saved` is when its file was saved.
-    pub fn publish(&self, snapshot: Arc<Snapshot>, saved: Option<f64>) {
+    /// Another picture. `saved` is when its file was saved.
+    pub fn publish(&self, picture: Picture, saved: Option<f64>) {
+        self.wanted.store(false, Ordering::Relaxed);
         let mut old = None;
         self.change(|s| {
-            old = s.picture.replace(snapshot);
+            old = s.picture.replace(picture);
             s.version += 1;
             s.saved = saved;
         });
@@ -269,9 +296,26 @@ impl Run {
         self.wanted.load(Ordering::Relaxed)
     }
 
-    /// Says that whoever waits will get one.
-    pub fn will_publish(&self) {
-        self.wanted.store(false, Ordering::Relaxed);
+    /// Counts time that the server has spent on pictures of this run.
+    pub fn spend(&self, time: Duration) {
+        let micros = u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
+        self.spent.fetch_add(micros, Ordering::Relaxed);
+    }
+
+    /// The time that the server has spent since this was last asked.
+    pub fn spent(&self) -> Duration {
+        Duration::from_micros(self.spent.swap(0, Ordering::Relaxed))
+    }
+
+    /// Whether this process still renders it.
+    pub fn is_growing(&self) -> bool {
+        let state = locked(&self.state);
+        state.about.live && state.ended.is_none()
+    }
+
+    /// Wakes at every change of any run.
+    pub fn changes(&self) -> watch::Receiver<u64> {
+        self.changes.subscribe()
     }
 
     /// Whether a picture was asked for not long ago.
@@ -286,18 +330,18 @@ impl Run {
         state.given == state.version
     }
 
-    /// The latest snapshot and its number, to be looked at: who renders will then make another.
-    pub fn look(&self) -> Option<(u64, Arc<Snapshot>)> {
+    /// The latest picture and its number, to be looked at: who renders will then make another.
+    pub fn look(&self) -> Option<(u64, Picture)> {
         self.wanted.store(true, Ordering::Relaxed);
         let mut state = locked(&self.state);
         state.looked = Some(Instant::now());
-        let snapshot = state.picture.clone()?;
+        let picture = state.picture.clone()?;
         state.given = state.version;
-        Some((state.version, snapshot))
+        Some((state.version, picture))
     }
 
-    /// The latest snapshot.
-    pub fn latest(&self) -> Option<Arc<Snapshot>> {
+    /// The latest picture.
+    pub fn latest(&self) -> Option<Picture> {
         locked(&self.state).picture.clone()
     }
 
@@ -399,7 +443,16 @@ mod tests {
         assert!(!run.is_wanted() && !run.is_looked_at());
         assert!(run.look().is_none());
         assert!(run.is_wanted() && run.is_looked_at());
-        run.will_publish();
-        assert!(!run.is_wanted());
+        let film = Film::new([1, 1], Rect::whole([1, 1]), 1);
+        let scene = Scene::default();
+        let provenance = Provenance::new(
+            &scene,
+            "",
+            &Settings::resolve(&scene, &Overrides::default()),
+        );
+        let snapshot = Snapshot::saved(film, provenance);
+        run.publish(Picture::Held(Arc::new(snapshot)), None);
+        assert!(!run.is_wanted() && !run.is_seen());
+        assert!(run.look().is_some() && run.is_wanted() && run.is_seen());
     }
 }

@@ -243,10 +243,16 @@ mod tests {
         assert_eq!(decode(picture[0]), [2.0; 3]);
         assert_eq!(decode(picture[1]), [3.0; 3]);
         assert_eq!(picture[2], ABSENT);
-        let samples: Vec<f32> = words(Layer::Samples).into_iter().map(f32::from_bits).collect();
+        let samples: Vec<f32> = words(Layer::Samples)
+            .into_iter()
+            .map(f32::from_bits)
+            .collect();
         assert_eq!(samples[..2], [4.0, 4.0]);
         assert!(samples[2].is_nan());
-        let errors: Vec<f32> = words(Layer::Error).into_iter().map(f32::from_bits).collect();
+        let errors: Vec<f32> = words(Layer::Error)
+            .into_iter()
+            .map(f32::from_bits)
+            .collect();
         assert_eq!(errors[..2], [0.0, 0.0], "equal replicates");
     }
 }

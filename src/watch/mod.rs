@@ -19,7 +19,7 @@ mod tev;
 
 pub use address::Address;
 pub use board::{About, Board, Run};
-pub use files::Files;
+pub use files::{Files, MOST_FILMS};
 pub use server::{Server, Stopped};
-pub use snapshot::Snapshot;
+pub use snapshot::{Picture, Snapshot};
 pub use tev::Tev;

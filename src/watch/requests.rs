@@ -2,7 +2,7 @@
 
 use super::board::{Board, Cursor, Run};
 use super::layers::{Layer, View};
-use super::snapshot::Snapshot;
+use super::snapshot::{Picture, Snapshot};
 use crate::compare::html::{escape, fill};
 use crate::film::coverage::Rect;
 use crate::output::{Format, WriteOptions, entries, store};
@@ -13,14 +13,13 @@ use hyper::header::{self, HeaderName, HeaderValue};
 use hyper::{Method, Request, Response, StatusCode};
 use serde_json::json;
 use sha2::{Digest, Sha256};
-use std::convert::Infallible;
 use std::fs::File;
 use std::io::Read as _;
 use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
 
 /// The page without its style and script.
@@ -42,6 +41,9 @@ const MOST_MEGABYTES: usize = 128;
 /// Files that are being downloaded at a time.
 const MOST_DOWNLOADS: usize = 4;
 
+/// How long a download waits for the newest picture at most.
+const NEWEST: Duration = Duration::from_secs(5);
+
 /// Shortest time between two updates to a client.
 const PAUSE: Duration = Duration::from_millis(200);
 
@@ -62,11 +64,20 @@ pub struct Site {
 /// The body of an answer.
 pub enum Answer {
     /// Bytes, and the room that they take until they are sent.
-    Whole(Bytes, Option<OwnedSemaphorePermit>),
+    Whole(
+        Bytes,
+        #[expect(dead_code, reason = "it is given back when the answer is dropped")]
+        Option<OwnedSemaphorePermit>,
+    ),
     /// Server-sent events.
     Events(mpsc::Receiver<Bytes>),
     /// A file, and how many bytes of it are left.
-    File(File, u64, OwnedSemaphorePermit),
+    File(
+        File,
+        u64,
+        #[expect(dead_code, reason = "it is given back when the answer is dropped")]
+        OwnedSemaphorePermit,
+    ),
 }
 
 impl Body for Answer {
@@ -77,12 +88,14 @@ impl Body for Answer {
         self: Pin<&mut Self>,
         cx: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, Self::Error>>> {
-        /// Bytes of a file that are read at once.
+        /// Bytes that are handed over at once: a slow client has no more than a few of these beyond its answer.
         const CHUNK: u64 = 1 << 18;
         let frame = match self.get_mut() {
             Self::Whole(bytes, _) if bytes.is_empty() => None,
-            Self::Whole(bytes, _) => Some(Ok(std::mem::take(bytes))),
-            Self::Events(events) => return events.poll_recv(cx).map(|e| e.map(|b| Ok(Frame::data(b)))),
+            Self::Whole(bytes, _) => Some(Ok(bytes.split_to(bytes.len().min(CHUNK as usize)))),
+            Self::Events(events) => {
+                return events.poll_recv(cx).map(|e| e.map(|b| Ok(Frame::data(b))));
+            }
             Self::File(_, 0, _) => None,
             Self::File(file, left, _) => {
                 let mut chunk = Vec::new();
@@ -132,7 +145,8 @@ impl Site {
             board,
             hosts,
             page: fill(PAGE, &values).into(),
-            policy: HeaderValue::try_from(policy).unwrap_or(HeaderValue::from_static("default-src 'none'")),
+            policy: HeaderValue::try_from(policy)
+                .unwrap_or(HeaderValue::from_static("default-src 'none'")),
             megabytes: Arc::new(Semaphore::new(MOST_MEGABYTES)),
             downloads: Arc::new(Semaphore::new(MOST_DOWNLOADS)),
         }
@@ -193,9 +207,13 @@ impl Site {
             ["runs", id, ref what @ ..] => {
                 let run = id.parse().ok().and_then(|id| self.board.run(id));
                 match (run, what) {
-                    (Some(run), ["layers", "picture"]) => self.layer(run, Layer::Picture, query).await,
+                    (Some(run), ["layers", "picture"]) => {
+                        self.layer(run, Layer::Picture, query).await
+                    }
                     (Some(run), ["layers", "error"]) => self.layer(run, Layer::Error, query).await,
-                    (Some(run), ["layers", "samples"]) => self.layer(run, Layer::Samples, query).await,
+                    (Some(run), ["layers", "samples"]) => {
+                        self.layer(run, Layer::Samples, query).await
+                    }
                     (Some(run), ["pixel"]) => self.pixel(run, query).await,
                     (Some(run), ["about"]) => about(&run),
                     (Some(run), ["picture.exr"]) => self.download(run, Download::Exr).await,
@@ -249,45 +267,56 @@ impl Site {
         let mut reply = reply("text/event-stream", Answer::Events(events));
         // nginx would otherwise keep events until there are many.
         let name = HeaderName::from_static("x-accel-buffering");
-        reply.headers_mut().insert(name, HeaderValue::from_static("no"));
+        reply
+            .headers_mut()
+            .insert(name, HeaderValue::from_static("no"));
         reply
     }
 
     /// A part of a layer, as six numbers of four bytes (the snapshot's number, the rectangle, and how many pixels have become one)
     /// and then its values.
     async fn layer(&self, run: Arc<Run>, layer: Layer, query: Query<'_>) -> Reply {
-        let Some((version, snapshot)) = run.look() else {
+        let Some((version, picture)) = run.look() else {
             return empty(StatusCode::NO_CONTENT);
         };
-        let Some(view) = query.view(snapshot.film().size) else {
-            return plain(StatusCode::BAD_REQUEST, "expected x0, y0, x1, y1 within the picture, and k");
+        let Some(view) = query.view(run.about().size) else {
+            return plain(
+                StatusCode::BAD_REQUEST,
+                "expected x0, y0, x1, y1 within the picture, and k",
+            );
         };
         let size = view.size().map(u64::from);
         let megabytes = (size[0] * size[1] * 4).div_ceil(1 << 20).max(1) as u32;
         let Ok(room) = self.megabytes.clone().try_acquire_many_owned(megabytes) else {
             return busy();
         };
-        made(move || {
+        made(run, picture, move |snapshot| {
             let View { rect, k } = view;
             let version = version as u32;
             let head = [version, rect.x0, rect.y0, rect.x1, rect.y1, k];
             let mut bytes: Vec<u8> = head.into_iter().flat_map(u32::to_le_bytes).collect();
             bytes.extend(snapshot.layers().bytes(layer, view));
-            reply("application/octet-stream", Answer::Whole(bytes.into(), Some(room)))
+            reply(
+                "application/octet-stream",
+                Answer::Whole(bytes.into(), Some(room)),
+            )
         })
         .await
     }
 
     async fn pixel(&self, run: Arc<Run>, query: Query<'_>) -> Reply {
-        let Some(snapshot) = run.latest() else {
+        let Some(picture) = run.latest() else {
             return empty(StatusCode::NO_CONTENT);
         };
-        let [width, height] = snapshot.film().size;
+        let [width, height] = run.about().size;
         let [x, y] = ["x", "y"].map(|key| query.whole(key));
         let (Some(x), Some(y)) = (x.filter(|x| *x < width), y.filter(|y| *y < height)) else {
-            return plain(StatusCode::BAD_REQUEST, "expected x and y within the picture");
+            return plain(
+                StatusCode::BAD_REQUEST,
+                "expected x and y within the picture",
+            );
         };
-        made(move || {
+        made(run, picture, move |snapshot| {
             let layers = snapshot.layers();
             let value = match layers.at(x, y) {
                 Some(e) => json!({
@@ -302,30 +331,59 @@ impl Site {
     }
 
     async fn download(&self, run: Arc<Run>, what: Download) -> Reply {
-        let Some(snapshot) = run.latest().filter(|s| !s.film().coverage.is_empty()) else {
-            return plain(StatusCode::NOT_FOUND, "there is no picture yet: open the page, and try again");
-        };
         let Ok(place) = self.downloads.clone().try_acquire_owned() else {
             return busy();
         };
-        made(move || match what.file(&snapshot) {
-            Ok((file, length)) => {
-                let mut reply = reply(what.kind(), Answer::File(file, length, place));
-                let name: String = run.name.chars().map(|c| match c {
-                    'a'..='z' | 'A'..='Z' | '0'..='9' | '-' | '_' | '.' => c,
-                    _ => '_',
-                }).collect();
-                let value = format!("attachment; filename=\"{name}.{}\"", what.extension());
-                if let Ok(value) = HeaderValue::try_from(value) {
-                    reply.headers_mut().insert(header::CONTENT_DISPOSITION, value);
-                }
-                reply
+        let none = || plain(StatusCode::NOT_FOUND, "there is no picture yet");
+        let Some(picture) = newest(&run).await else {
+            return none();
+        };
+        let name = format!("{}.{}", plain_name(&run.name), what.extension());
+        made(run, picture, move |snapshot| {
+            if snapshot.film().coverage.is_empty() {
+                return none();
             }
-            // The error names a temporary file, which is nobody's business.
-            Err(_) => plain(StatusCode::INTERNAL_SERVER_ERROR, "the file can't be made: is there room for temporary files?"),
+            // An error would name a temporary file, which is nobody's business.
+            let Ok((file, length)) = what.file(snapshot) else {
+                let why = "the file can't be made: is there room for temporary files?";
+                return plain(StatusCode::INTERNAL_SERVER_ERROR, why);
+            };
+            let mut reply = reply(what.kind(), Answer::File(file, length, place));
+            let value = format!("attachment; filename=\"{name}\"");
+            if let Ok(value) = HeaderValue::try_from(value) {
+                reply
+                    .headers_mut()
+                    .insert(header::CONTENT_DISPOSITION, value);
+            }
+            reply
         })
         .await
     }
+}
+
+/// The picture as it stands now. Who renders copies it only when someone asks, and then soon.
+async fn newest(run: &Run) -> Option<Picture> {
+    let mut changes = run.changes();
+    let before = run.look().map(|(version, _)| version);
+    let until = tokio::time::Instant::now() + NEWEST;
+    while run.is_growing() && run.look().map(|(version, _)| version) == before {
+        if tokio::time::timeout_at(until, changes.changed())
+            .await
+            .is_err()
+        {
+            break;
+        }
+    }
+    run.look().map(|(_, picture)| picture)
+}
+
+/// A file's name without what a header or a file system may take amiss.
+fn plain_name(name: &str) -> String {
+    let plain = |c: char| match c {
+        'a'..='z' | 'A'..='Z' | '0'..='9' | '-' | '_' | '.' => c,
+        _ => '_',
+    };
+    name.chars().map(plain).collect()
 }
 
 /// A file that is made of a snapshot.
@@ -356,7 +414,9 @@ impl Download {
 
     /// The file, which has no name any more, and its length.
     fn file(self, snapshot: &Snapshot) -> Result<(File, u64), crate::files::FileError> {
-        let failed = |e: std::io::Error| crate::files::FileError::io("temporary file".as_ref(), "cannot write", &e);
+        let failed = |e: std::io::Error| {
+            crate::files::FileError::io("temporary file".as_ref(), "cannot write", &e)
+        };
         let dir = tempfile::tempdir().map_err(failed)?;
         let path = dir.path().join(format!("picture.{}", self.extension()));
         let (film, provenance) = (snapshot.film(), snapshot.provenance());
@@ -364,7 +424,10 @@ impl Download {
             Self::Film => store::save(&path, film, &provenance)?,
             Self::Exr => Format::Exr.write(&path, film, &provenance, &WriteOptions::default())?,
             Self::Png(exposure_stops) => {
-                let options = WriteOptions { exposure_stops, ..WriteOptions::default() };
+                let options = WriteOptions {
+                    exposure_stops,
+                    ..WriteOptions::default()
+                };
                 Format::Png.write(&path, film, &provenance, &options)?;
             }
         }
@@ -419,9 +482,16 @@ impl Query<'_> {
             x1: side("x1", size[0])?,
             y1: side("y1", size[1])?,
         };
-        let within = rect.x0 < rect.x1 && rect.x1 <= size[0] && rect.y0 < rect.y1 && rect.y1 <= size[1];
+        let within =
+            rect.x0 < rect.x1 && rect.x1 <= size[0] && rect.y0 < rect.y1 && rect.y1 <= size[1];
         let k = side("k", 1)?.max(1);
-        let area = |k: u32| View { rect, k }.size().map(u64::from).iter().product::<u64>();
+        let area = |k: u32| {
+            View { rect, k }
+                .size()
+                .map(u64::from)
+                .iter()
+                .product::<u64>()
+        };
         let k = (k..=k.max(1 << 16)).find(|k| area(*k) <= MOST_PIXELS);
         within.then_some(View { rect, k: k? })
     }
@@ -437,15 +507,33 @@ fn is_known_host(host: &str, names: &[String]) -> bool {
     let Some(name) = name else {
         return false;
     };
-    let same = |known: &String| known.eq_ignore_ascii_case(name) || known.eq_ignore_ascii_case(host);
-    name.parse::<IpAddr>().is_ok() || name.eq_ignore_ascii_case("localhost") || names.iter().any(same)
+    let same =
+        |known: &String| known.eq_ignore_ascii_case(name) || known.eq_ignore_ascii_case(host);
+    name.parse::<IpAddr>().is_ok()
+        || name.eq_ignore_ascii_case("localhost")
+        || names.iter().any(same)
 }
 
-/// Makes an answer on another thread.
-async fn made(make: impl FnOnce() -> Reply + Send + 'static) -> Reply {
-    let made = tokio::task::spawn_blocking(make).await;
+/// Makes an answer of a picture on another thread, and counts the time for its run.
+async fn made(
+    run: Arc<Run>,
+    picture: Picture,
+    make: impl FnOnce(&Snapshot) -> Reply + Send + 'static,
+) -> Reply {
+    let made = tokio::task::spawn_blocking(move || {
+        let begun = Instant::now();
+        let reply = match picture.open() {
+            Ok(snapshot) => make(&snapshot),
+            Err(e) => {
+                run.problem(Some(e.message().into()));
+                empty(StatusCode::NO_CONTENT)
+            }
+        };
+        run.spend(begun.elapsed());
+        reply
+    });
     // It fails only while the process ends.
-    made.unwrap_or_else(|_| busy())
+    made.await.unwrap_or_else(|_| busy())
 }
 
 fn reply(kind: &'static str, body: Answer) -> Reply {
@@ -460,7 +548,10 @@ fn whole(kind: &'static str, bytes: Bytes) -> Reply {
 }
 
 fn plain(status: StatusCode, text: &'static str) -> Reply {
-    let mut reply = whole("text/plain; charset=utf-8", Bytes::from_static(text.as_bytes()));
+    let mut reply = whole(
+        "text/plain; charset=utf-8",
+        Bytes::from_static(text.as_bytes()),
+    );
     *reply.status_mut() = status;
     reply
 }
@@ -472,7 +563,10 @@ fn empty(status: StatusCode) -> Reply {
 }
 
 fn busy() -> Reply {
-    let mut reply = plain(StatusCode::SERVICE_UNAVAILABLE, "too many requests at a time; try again");
+    let mut reply = plain(
+        StatusCode::SERVICE_UNAVAILABLE,
+        "too many requests at a time; try again",
+    );
     let headers = reply.headers_mut();
     headers.insert(header::RETRY_AFTER, HeaderValue::from_static("2"));
     reply
@@ -490,14 +584,28 @@ mod tests {
     fn only_known_names_are_answered() {
         let names = ["render.example.org".to_owned()];
         for known in [
-            "localhost", "localhost:8080", "LocalHost:1", "127.0.0.1:8080", "10.1.2.3", "[::1]:8080", "[::1]",
-            "render.example.org", "Render.Example.org:443",
+            "localhost",
+            "localhost:8080",
+            "LocalHost:1",
+            "127.0.0.1:8080",
+            "10.1.2.3",
+            "[::1]:8080",
+            "[::1]",
+            "render.example.org",
+            "Render.Example.org:443",
         ] {
             assert!(is_known_host(known, &names), "{known}");
         }
         for unknown in [
-            "evil.example", "localhost.evil.example:8080", "127.0.0.1.evil.example", "", ":8080", "[evil]:80", "[::1",
-            "example.org", "127.0.0.256",
+            "evil.example",
+            "localhost.evil.example:8080",
+            "127.0.0.1.evil.example",
+            "",
+            ":8080",
+            "[evil]:80",
+            "[::1",
+            "example.org",
+            "127.0.0.256",
         ] {
             assert!(!is_known_host(unknown, &names), "{unknown}");
         }
@@ -512,7 +620,14 @@ mod tests {
         assert_eq!((part.size(), part.k), ([2, 2], 1));
         let large = view("k=2", [65536, 65536]).unwrap();
         assert!(large.k >= 46 && large.size()[0] < 1450, "{large:?}");
-        for bad in ["x0=-1", "x1=513", "x0=5&x1=5", "y0=one", "k=x", "x1=99999999999"] {
+        for bad in [
+            "x0=-1",
+            "x1=513",
+            "x0=5&x1=5",
+            "y0=one",
+            "k=x",
+            "x1=99999999999",
+        ] {
             assert_eq!(view(bad, [512, 384]), None, "{bad}");
         }
     }

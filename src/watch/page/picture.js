@@ -15,7 +15,12 @@ const ABSENT = 0xf8000000;
 /** Fetches a part of a layer; null while there is none. */
 async function fetchLayer(run, layer, rect, k, signal) {
   const [x0, y0, x1, y1] = rect;
-  const answer = await fetch(`runs/${run}/layers/${layer}?x0=${x0}&y0=${y0}&x1=${x1}&y1=${y1}&k=${k}`, { signal });
+  const address = `runs/${run}/layers/${layer}?x0=${x0}&y0=${y0}&x1=${x1}&y1=${y1}&k=${k}`;
+  let answer = await fetch(address, { signal });
+  while (answer.status === 503) {
+    await new Promise((done) => setTimeout(done, 2000));
+    answer = await fetch(address, { signal });
+  }
   if (answer.status !== 200) return null;
   const bytes = await answer.arrayBuffer();
   const head = new Uint32Array(bytes, 0, 6);
@@ -99,8 +104,10 @@ class PictureView {
   }
 
   /** Shows another run, of pictures of this size. */
-  show(run, size) {
+  show(run, size, regions) {
+    this.regions = regions;
     if (this.run === run && this.size && this.size.join() === size.join()) return;
+    if (!size[0]) return;
     Object.assign(this, { run, size, scale: 0, center: size.map((n) => n / 2), whole: null, part: null, pixel: null, range: null });
     this.changed();
   }
@@ -131,14 +138,20 @@ class PictureView {
     this.changed();
   }
 
+  /** Makes a pixel of the picture this many pixels of the screen. */
+  toScale(pixels) {
+    if (this.size) this.zoom(pixels / devicePixelRatio / this.zoomed);
+  }
+
   /** Zooms by a factor, with the point `at` of the picture where it is. */
   zoom(factor, at = this.center) {
     if (!this.size) return;
     const before = this.zoomed;
-    const scale = Math.min(64, Math.max(this.fitting, before * factor));
+    const smallest = Math.min(this.fitting, 1 / devicePixelRatio);
+    const scale = Math.min(64, Math.max(smallest, before * factor));
     const moved = before / scale;
     this.center = [0, 1].map((i) => at[i] + (this.center[i] - at[i]) * moved);
-    this.scale = scale <= this.fitting * 1.001 ? 0 : scale;
+    this.scale = Math.abs(scale / this.fitting - 1) < 0.001 ? 0 : scale;
     this.clamp();
     this.changed();
   }
@@ -209,7 +222,7 @@ class PictureView {
 
   /** Fetches what is seen, in as many pixels as the screen has. */
   async refresh() {
-    if (this.run === null || document.hidden || !this.canvas.clientWidth) return;
+    if (this.run === null || !this.size || document.hidden || !this.canvas.clientWidth) return;
     if (this.fetching) {
       this.again = true;
       return;
@@ -263,6 +276,13 @@ class PictureView {
       context.imageSmoothingEnabled = data.k * scale < 2;
       const [left, top] = [place(x0, 0), place(y0, 1)];
       context.drawImage(data.canvas, left, top, place(x0 + data.width * data.k, 0) - left, place(y0 + data.height * data.k, 1) - top);
+    }
+    for (const [x0, y0, x1, y1] of this.regions || []) {
+      context.strokeStyle = "#888";
+      context.lineWidth = ratio;
+      context.setLineDash([4 * ratio, 3 * ratio]);
+      context.strokeRect(place(x0, 0), place(y0, 1), place(x1, 0) - place(x0, 0), place(y1, 1) - place(y0, 1));
+      context.setLineDash([]);
     }
     if (this.pixel && this.whole) {
       const [x, y] = this.pixel;
