@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::files::Files;
 use super::progress::Progress;
 use super::say;
-use crate::engine::DeviceInfo;
+use crate::engine::{Counters, DeviceInfo};
 use crate::film::Film;
 use crate::log::{Event, LogFile, Message, Start};
 use crate::provenance::Provenance;
@@ -115,12 +115,13 @@ impl Audience {
 
     /// The run begins, of a film that comes from `before`.
     pub fn start(&mut self, start: Start, before: &Provenance, device: &DeviceInfo) {
-        let before = Arc::new(before.clone());
         if let Some(page) = &self.page {
+            let mut with_device = before.clone();
+            with_device.add_work(device, Counters::default(), 0.0);
             page.run
-                .begin(About::of(&start, true, Some(before.clone())));
+                .begin(About::of(&start, true, Some(Arc::new(with_device))));
         }
-        self.source = Some((before, device.clone()));
+        self.source = Some((Arc::new(before.clone()), device.clone()));
         events::emit(&Event::Start(Box::new(start)), true);
     }
 

@@ -8,10 +8,13 @@
 //! it. All else is done by the server's threads. Nothing that a client does, or does not do, makes the renderer wait.
 
 mod address;
+mod answer;
 mod board;
 mod connection;
+mod download;
 mod files;
 mod layers;
+mod query;
 mod requests;
 mod server;
 mod snapshot;

@@ -1,26 +1,23 @@
 //! What the server answers.
 
+use super::answer::{Answer, Reply, busy, empty, not_found, plain, reply, whole};
 use super::board::{Board, Cursor, Run};
+use super::download::{Download, plain_name};
 use super::layers::{Layer, View};
+use super::query::{Query, is_known_host};
 use super::snapshot::{Picture, Snapshot};
 use crate::compare::html::{escape, fill};
-use crate::film::coverage::Rect;
-use crate::output::{Format, WriteOptions, entries, store};
+use crate::output::entries;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use hyper::body::{Body, Bytes, Frame, Incoming};
+use hyper::body::{Bytes, Incoming};
 use hyper::header::{self, HeaderName, HeaderValue};
-use hyper::{Method, Request, Response, StatusCode};
+use hyper::{Method, Request, StatusCode};
 use serde_json::json;
 use sha2::{Digest, Sha256};
-use std::fs::File;
-use std::io::Read as _;
-use std::net::IpAddr;
-use std::pin::Pin;
 use std::sync::Arc;
-use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio::sync::{Semaphore, mpsc};
 
 /// The page without its style and script.
 const PAGE: &str = include_str!("page/page.html");
@@ -32,9 +29,6 @@ const SCRIPT: &str = concat!(
     include_str!("page/page.js")
 );
 
-/// Pixels of a view at most; a larger one is answered with fewer.
-const MOST_PIXELS: u64 = 2 << 20;
-
 /// Megabytes of views that slow clients have not taken yet.
 const MOST_MEGABYTES: usize = 128;
 
@@ -44,8 +38,8 @@ const MOST_DOWNLOADS: usize = 4;
 /// How long a download waits for the newest picture at most.
 const NEWEST: Duration = Duration::from_secs(5);
 
-/// Shortest time between two updates to a client.
-const PAUSE: Duration = Duration::from_millis(200);
+/// Shortest time between two updates to a client, so that a hundred of them cost nothing.
+const PAUSE: Duration = Duration::from_secs(1);
 
 /// Without news, this tells whether the client is still there, and keeps a proxy from giving up.
 const HEARTBEAT: Duration = Duration::from_secs(15);
@@ -60,71 +54,6 @@ pub struct Site {
     megabytes: Arc<Semaphore>,
     downloads: Arc<Semaphore>,
 }
-
-/// The body of an answer.
-pub enum Answer {
-    /// Bytes, and the room that they take until they are sent.
-    Whole(
-        Bytes,
-        #[expect(dead_code, reason = "it is given back when the answer is dropped")]
-        Option<OwnedSemaphorePermit>,
-    ),
-    /// Server-sent events.
-    Events(mpsc::Receiver<Bytes>),
-    /// A file, and how many bytes of it are left.
-    File(
-        File,
-        u64,
-        #[expect(dead_code, reason = "it is given back when the answer is dropped")]
-        OwnedSemaphorePermit,
-    ),
-}
-
-impl Body for Answer {
-    type Data = Bytes;
-    type Error = std::io::Error;
-
-    fn poll_frame(
-        self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Self::Error>>> {
-        /// Bytes that are handed over at once: a slow client has no more than a few of these beyond its answer.
-        const CHUNK: u64 = 1 << 18;
-        let frame = match self.get_mut() {
-            Self::Whole(bytes, _) if bytes.is_empty() => None,
-            Self::Whole(bytes, _) => Some(Ok(bytes.split_to(bytes.len().min(CHUNK as usize)))),
-            Self::Events(events) => {
-                return events.poll_recv(cx).map(|e| e.map(|b| Ok(Frame::data(b))));
-            }
-            Self::File(_, 0, _) => None,
-            Self::File(file, left, _) => {
-                let mut chunk = Vec::new();
-                let read = file.take(CHUNK.min(*left)).read_to_end(&mut chunk);
-                let read = read.and_then(|n| match n {
-                    0 => Err(std::io::ErrorKind::UnexpectedEof.into()),
-                    n => Ok(n),
-                });
-                *left -= read.as_ref().map_or(0, |n| *n as u64);
-                Some(read.map(|_| chunk.into()))
-            }
-        };
-        Poll::Ready(frame.map(|f| f.map(Frame::data)))
-    }
-
-    fn is_end_stream(&self) -> bool {
-        matches!(self, Self::Whole(bytes, _) if bytes.is_empty())
-    }
-
-    fn size_hint(&self) -> hyper::body::SizeHint {
-        match self {
-            Self::Whole(bytes, _) => hyper::body::SizeHint::with_exact(bytes.len() as u64),
-            Self::File(_, left, _) => hyper::body::SizeHint::with_exact(*left),
-            Self::Events(_) => hyper::body::SizeHint::default(),
-        }
-    }
-}
-
-type Reply = Response<Answer>;
 
 impl Site {
     /// The site of a board. `hosts`: see [`super::Server::serve`].
@@ -290,7 +219,7 @@ impl Site {
         let Ok(room) = self.megabytes.clone().try_acquire_many_owned(megabytes) else {
             return busy();
         };
-        made(run, picture, move |snapshot| {
+        made(run, picture, true, move |snapshot| {
             let View { rect, k } = view;
             let version = version as u32;
             let head = [version, rect.x0, rect.y0, rect.x1, rect.y1, k];
@@ -316,7 +245,7 @@ impl Site {
                 "expected x and y within the picture",
             );
         };
-        made(run, picture, move |snapshot| {
+        made(run, picture, true, move |snapshot| {
             let layers = snapshot.layers();
             let value = match layers.at(x, y) {
                 Some(e) => json!({
@@ -339,7 +268,7 @@ impl Site {
             return none();
         };
         let name = format!("{}.{}", plain_name(&run.name), what.extension());
-        made(run, picture, move |snapshot| {
+        made(run, picture, false, move |snapshot| {
             if snapshot.film().coverage.is_empty() {
                 return none();
             }
@@ -377,147 +306,28 @@ async fn newest(run: &Run) -> Option<Picture> {
     run.look().map(|(_, picture)| picture)
 }
 
-/// A file's name without what a header or a file system may take amiss.
-fn plain_name(name: &str) -> String {
-    let plain = |c: char| match c {
-        'a'..='z' | 'A'..='Z' | '0'..='9' | '-' | '_' | '.' => c,
-        _ => '_',
-    };
-    name.chars().map(plain).collect()
-}
-
-/// A file that is made of a snapshot.
-#[derive(Clone, Copy)]
-enum Download {
-    Exr,
-    /// With so many stops of exposure.
-    Png(f64),
-    Film,
-}
-
-impl Download {
-    fn extension(self) -> &'static str {
-        match self {
-            Self::Exr => "exr",
-            Self::Png(_) => "png",
-            Self::Film => "npz",
-        }
-    }
-
-    fn kind(self) -> &'static str {
-        match self {
-            Self::Exr => "image/x-exr",
-            Self::Png(_) => "image/png",
-            Self::Film => "application/zip",
-        }
-    }
-
-    /// The file, which has no name any more, and its length.
-    fn file(self, snapshot: &Snapshot) -> Result<(File, u64), crate::files::FileError> {
-        let failed = |e: std::io::Error| {
-            crate::files::FileError::io("temporary file".as_ref(), "cannot write", &e)
-        };
-        let dir = tempfile::tempdir().map_err(failed)?;
-        let path = dir.path().join(format!("picture.{}", self.extension()));
-        let (film, provenance) = (snapshot.film(), snapshot.provenance());
-        match self {
-            Self::Film => store::save(&path, film, &provenance)?,
-            Self::Exr => Format::Exr.write(&path, film, &provenance, &WriteOptions::default())?,
-            Self::Png(exposure_stops) => {
-                let options = WriteOptions {
-                    exposure_stops,
-                    ..WriteOptions::default()
-                };
-                Format::Png.write(&path, film, &provenance, &options)?;
-            }
-        }
-        let file = File::open(&path).map_err(failed)?;
-        let length = file.metadata().map_err(failed)?.len();
-        Ok((file, length))
-    }
-}
-
-/// What a run is.
+/// What a run is: all that does not change while it goes on.
 fn about(run: &Run) -> Reply {
+    /// These are on the page already, as they are now.
+    const GROWING: [&str; 3] = ["samples", "replicates", "seconds"];
     let about = run.about();
     let Some(provenance) = about.provenance.as_deref() else {
         return empty(StatusCode::NO_CONTENT);
     };
     let entries: Vec<(&str, String)> = entries(provenance)
         .into_iter()
+        .filter(|(key, _)| !GROWING.contains(key) && !key.starts_with("relative_error"))
         .map(|(key, value)| (key, value.to_string()))
         .collect();
     let value = json!({"entries": entries, "scene_text": provenance.scene_text});
     whole("application/json", value.to_string().into())
 }
 
-/// A query of numbers.
-#[derive(Clone, Copy)]
-struct Query<'a>(&'a str);
-
-impl Query<'_> {
-    fn get(&self, key: &str) -> Option<&str> {
-        let pairs = self.0.split('&').filter_map(|pair| pair.split_once('='));
-        pairs.filter(|(k, _)| *k == key).map(|(_, v)| v).next()
-    }
-
-    fn whole(&self, key: &str) -> Option<u32> {
-        self.get(key)?.parse().ok()
-    }
-
-    fn number(&self, key: &str) -> Option<f64> {
-        let number: f64 = self.get(key)?.parse().ok()?;
-        (number.abs() <= 100.0).then_some(number)
-    }
-
-    /// The whole picture if nothing is said; `k` as large as it takes. `None` if it is not within the picture.
-    fn view(&self, size: [u32; 2]) -> Option<View> {
-        let side = |key, default| match self.get(key) {
-            Some(_) => self.whole(key),
-            None => Some(default),
-        };
-        let rect = Rect {
-            x0: side("x0", 0)?,
-            y0: side("y0", 0)?,
-            x1: side("x1", size[0])?,
-            y1: side("y1", size[1])?,
-        };
-        let within =
-            rect.x0 < rect.x1 && rect.x1 <= size[0] && rect.y0 < rect.y1 && rect.y1 <= size[1];
-        let k = side("k", 1)?.max(1);
-        let area = |k: u32| {
-            View { rect, k }
-                .size()
-                .map(u64::from)
-                .iter()
-                .product::<u64>()
-        };
-        let k = (k..=k.max(1 << 16)).find(|k| area(*k) <= MOST_PIXELS);
-        within.then_some(View { rect, k: k? })
-    }
-}
-
-/// Whether a request may call this server so. A page of someone else, whose name was made to lead here, would be read by its own
-/// script; so names must be known. A number is no name, and leads where it says.
-fn is_known_host(host: &str, names: &[String]) -> bool {
-    let name = match host.strip_prefix('[') {
-        Some(rest) => rest.split_once(']').map(|(inside, _)| inside),
-        None => host.split(':').next(),
-    };
-    let Some(name) = name else {
-        return false;
-    };
-    let same =
-        |known: &String| known.eq_ignore_ascii_case(name) || known.eq_ignore_ascii_case(host);
-    name.parse::<IpAddr>().is_ok()
-        || name.eq_ignore_ascii_case("localhost")
-        || names.iter().any(same)
-}
-
-/// Makes an answer of a picture on another thread, and counts the time for its run.
+/// Makes an answer of a picture on another thread. Time that is `counted` makes the next picture of the run come later.
 async fn made(
     run: Arc<Run>,
     picture: Picture,
+    counted: bool,
     make: impl FnOnce(&Snapshot) -> Reply + Send + 'static,
 ) -> Reply {
     let made = tokio::task::spawn_blocking(move || {
@@ -529,106 +339,11 @@ async fn made(
                 empty(StatusCode::NO_CONTENT)
             }
         };
-        run.spend(begun.elapsed());
+        if counted {
+            run.spend(begun.elapsed());
+        }
         reply
     });
     // It fails only while the process ends.
     made.await.unwrap_or_else(|_| busy())
-}
-
-fn reply(kind: &'static str, body: Answer) -> Reply {
-    let mut reply = Response::new(body);
-    let headers = reply.headers_mut();
-    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static(kind));
-    reply
-}
-
-fn whole(kind: &'static str, bytes: Bytes) -> Reply {
-    reply(kind, Answer::Whole(bytes, None))
-}
-
-fn plain(status: StatusCode, text: &'static str) -> Reply {
-    let mut reply = whole(
-        "text/plain; charset=utf-8",
-        Bytes::from_static(text.as_bytes()),
-    );
-    *reply.status_mut() = status;
-    reply
-}
-
-fn empty(status: StatusCode) -> Reply {
-    let mut reply = Response::new(Answer::Whole(Bytes::new(), None));
-    *reply.status_mut() = status;
-    reply
-}
-
-fn busy() -> Reply {
-    let mut reply = plain(
-        StatusCode::SERVICE_UNAVAILABLE,
-        "too many requests at a time; try again",
-    );
-    let headers = reply.headers_mut();
-    headers.insert(header::RETRY_AFTER, HeaderValue::from_static("2"));
-    reply
-}
-
-fn not_found() -> Reply {
-    plain(StatusCode::NOT_FOUND, "not found")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_known_names_are_answered() {
-        let names = ["render.example.org".to_owned()];
-        for known in [
-            "localhost",
-            "localhost:8080",
-            "LocalHost:1",
-            "127.0.0.1:8080",
-            "10.1.2.3",
-            "[::1]:8080",
-            "[::1]",
-            "render.example.org",
-            "Render.Example.org:443",
-        ] {
-            assert!(is_known_host(known, &names), "{known}");
-        }
-        for unknown in [
-            "evil.example",
-            "localhost.evil.example:8080",
-            "127.0.0.1.evil.example",
-            "",
-            ":8080",
-            "[evil]:80",
-            "[::1",
-            "example.org",
-            "127.0.0.256",
-        ] {
-            assert!(!is_known_host(unknown, &names), "{unknown}");
-        }
-    }
-
-    #[test]
-    fn views_lie_within_the_picture_and_are_not_too_large() {
-        let view = |query: &str, size| Query(query).view(size);
-        let whole = view("", [512, 384]).unwrap();
-        assert_eq!((whole.rect, whole.k), (Rect::whole([512, 384]), 1));
-        let part = view("x0=1&y0=2&x1=3&y1=4&k=0", [512, 384]).unwrap();
-        assert_eq!((part.size(), part.k), ([2, 2], 1));
-        let large = view("k=2", [65536, 65536]).unwrap();
-        assert!(large.k >= 46 && large.size()[0] < 1450, "{large:?}");
-        for bad in [
-            "x0=-1",
-            "x1=513",
-            "x0=5&x1=5",
-            "y0=one",
-            "k=x",
-            "x1=99999999999",
-        ] {
-            assert_eq!(view(bad, [512, 384]), None, "{bad}");
-        }
-    }
 }

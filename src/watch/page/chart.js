@@ -66,7 +66,9 @@ function drawChart(svg, curve, target, forecast, hovered) {
   if (forecast) {
     const steps = Array.from({ length: 20 }, (_, i) => last[0] * (forecast[0] / last[0]) ** (i / 19));
     add("path", { class: "forecast", d: path(steps.map((t) => [t, last[2] * Math.sqrt(last[0] / t)])) });
-    add("text", { class: "named", x: box.right - 4, y: Math.max(box.top + 10, down(forecast[1]) - 8), "text-anchor": "end" }, "forecast");
+    const middle = steps[10];
+    const room = across(middle) + 60 < box.right;
+    if (room) add("text", { class: "named", x: across(middle) + 6, y: down(last[2] * Math.sqrt(last[0] / middle)) - 4 }, "forecast");
   }
   add("path", { class: "line", d: path(points.map((p) => [p[0], p[2]])) });
   add("circle", { class: "dot", cx: across(last[0]), cy: down(last[2]), r: 3.5 });

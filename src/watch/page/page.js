@@ -119,7 +119,7 @@ function showLegend(picture) {
   set("low", text(low));
   set("middle", text(layer === "error" ? Math.sqrt(low * high) : (low + high) / 2));
   set("high", text(high));
-  set("what", layer === "error" ? "standard error of a pixel over its luminance, where dark over 1/10 of the mean" : "samples of a pixel");
+  set("what", layer === "error" ? "standard error of a pixel over its luminance; of dark pixels over 1/10 of the mean" : "samples of a pixel");
 }
 
 let asking = null;
