@@ -304,7 +304,7 @@ fn a_night_is_seen_at_a_glance() {
         (browser.eval("view.whole !== null") == true).then_some(())
     });
     browser.shot("film.png");
-    assert_eq!(browser.text("title"), "Test box");
+    assert_eq!(browser.text("title"), "Test box \u{b7} 1.npz");
     browser.key("Escape");
     until("way back", || {
         (browser.eval("document.getElementById('overview').hidden") == false).then_some(())

@@ -16,8 +16,8 @@ fn clients_change_no_bit() {
     let running = Running::serve(&bench, &format!("{args} watched.npz --log a.jsonl"));
     let done = AtomicBool::new(false);
     let mut looks = 0;
+    let mut events = running.events();
     std::thread::scope(|scope| {
-        let mut events = running.events();
         scope.spawn(|| {
             events.next(|u| !u["ended"].is_null());
             done.store(true, Ordering::Relaxed);

@@ -67,7 +67,8 @@ function showRun() {
   const run = current;
   if (!run) return;
   const { now, about } = run;
-  set("title", about.title);
+  const many = runs.filter(Boolean).length > 1 && about.file !== about.title;
+  set("title", about.title + (many ? " \u00b7 " + about.file : ""));
   const error = now ? errorText(now) : "unknown";
   document.title = (now && now.relative_error !== null ? percent(now.relative_error) + " \u00b7 " : "") + about.title;
   set("state", stateText(run));
@@ -196,7 +197,7 @@ function card(run) {
   const item = element("li");
   const button = item.appendChild(element("button"));
   button.append(element("canvas"), element("span", { class: "told" }));
-  for (const part of ["name", "err", "more"]) button.lastChild.append(element("span", { class: part }));
+  for (const part of ["name", "file", "err", "more"]) button.lastChild.append(element("span", { class: part }));
   button.addEventListener("click", () => (location.hash = "run-" + run.id));
   item.run = run;
   seen.observe(item);
@@ -208,6 +209,8 @@ function showCard(run) {
   const item = card(run);
   const part = (name) => item.querySelector("." + name);
   part("name").textContent = run.about.title;
+  // Many films may be of one scene.
+  part("file").textContent = run.about.file === run.about.title ? "" : run.about.file;
   part("err").textContent = run.now ? "error " + errorText(run.now) : "";
   const left = leftText(run);
   const more = [stateText(run)];
