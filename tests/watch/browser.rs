@@ -167,10 +167,7 @@ fn the_picture_grows_in_a_browser() {
     let Some(mut browser) = Browser::open() else {
         return;
     };
-    let running = Running::serve(
-        &bench,
-        "render box.toml --backend cpu --threads 1 --size 96x64 --time 25s --error 0.01% -o a.png --report a.json",
-    );
+    let running = Running::endless(&bench, "--size 96x64 --error 0.01% --report a.json");
     browser.window(1280, 900, false);
     browser.call(
         "Page.navigate",
@@ -249,7 +246,7 @@ fn the_picture_grows_in_a_browser() {
         browser.text("state").starts_with("done").then_some(())
     });
     let [error, samples] = ["error", "samples"].map(|id| browser.text(id));
-    assert_eq!(running.end().0, Some(0));
+    assert_eq!(running.end().0, Some(130));
     let report = std::fs::read_to_string(bench.path("a.json")).unwrap();
     let report: Value = serde_json::from_str(&report).unwrap();
     let stated: f64 = error.split(' ').next().unwrap().parse().unwrap();

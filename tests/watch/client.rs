@@ -79,6 +79,10 @@ impl Running {
         self.said.lock().unwrap().clone()
     }
 
+    pub fn is_running(&mut self) -> bool {
+        self.child.try_wait().expect("its status").is_none()
+    }
+
     /// Its exit status, and all that it has said.
     pub fn end(mut self) -> (Option<i32>, String) {
         let status = self.child.wait().expect("its end").code();
