@@ -181,7 +181,13 @@ fn the_picture_grows_in_a_browser() {
     until("growth", || {
         (browser.canvas() != first && browser.text("samples") != samples).then_some(())
     });
-    let light = browser.shot("light.png");
+    // What is on the canvas is on the screen a moment later.
+    let light = until("picture on the screen", || {
+        let shot = browser.shot("light.png");
+        let row = (100..800).map(|x| *shot.get_pixel(x, 440));
+        let colours: std::collections::BTreeSet<_> = row.map(|p| p.0).collect();
+        (colours.len() > 10).then_some(shot)
+    });
 
     // Controls, by keyboard.
     browser.eval("document.getElementById('picture').focus()");

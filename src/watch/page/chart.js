@@ -35,16 +35,18 @@ function drawChart(svg, curve, target, forecast, hovered) {
   const times = points.map((p) => p[0]).concat(forecast ? [forecast[0]] : []);
   const errors = points.flatMap((p) => [low(p), p[2] + p[3]]).concat(target ? [target] : [], forecast ? [forecast[1]] : []);
   const x = [Math.min(...times) / 1.2, Math.max(...times) * 1.2], y = [Math.min(...errors) / 1.25, Math.max(...errors) * 1.25];
-  const box = { left: 52, right: width - 10, top: 8, bottom: height - 34 };
+  const box = { left: 52, right: width - 18, top: 8, bottom: height - 34 };
   const across = (t) => box.left + (Math.log(t / x[0]) / Math.log(x[1] / x[0])) * (box.right - box.left);
   const down = (e) => box.bottom - (Math.log(e / y[0]) / Math.log(y[1] / y[0])) * (box.bottom - box.top);
 
   let free = -Infinity;
   for (const t of ticks(...x)) {
     add("line", { class: "grid", x1: across(t), x2: across(t), y1: box.top, y2: box.bottom });
-    if (across(t) - free < 34) continue;
-    free = across(t);
-    add("text", { x: across(t), y: box.bottom + 14, "text-anchor": "middle" }, digits(t, 1).length > 6 ? t.toExponential(0) : String(t));
+    const label = t < 10000 ? String(t) : t.toExponential().replace("+", "");
+    const half = 3.5 * label.length;
+    if (across(t) - half < free) continue;
+    free = across(t) + half + 8;
+    add("text", { x: across(t), y: box.bottom + 14, "text-anchor": "middle" }, label);
   }
   free = Infinity;
   for (const e of ticks(...y)) {
@@ -61,7 +63,7 @@ function drawChart(svg, curve, target, forecast, hovered) {
   if (target) {
     add("line", { class: "target", x1: box.left, x2: box.right, y1: down(target), y2: down(target) });
     const below = down(target) < box.top + 20;
-    add("text", { class: "named", x: box.left + 6, y: down(target) + (below ? 14 : -5) }, "target " + percent(target));
+    add("text", { class: "named", x: box.left + 6, y: down(target) + (below ? 14 : -5) }, "target " + short(target));
   }
   if (forecast) {
     const steps = Array.from({ length: 20 }, (_, i) => last[0] * (forecast[0] / last[0]) ** (i / 19));

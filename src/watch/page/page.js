@@ -27,7 +27,7 @@ function forecast(run) {
 
 function targetText({ samples, seconds, relative_error }) {
   const all = [];
-  if (relative_error !== null) all.push("error " + percent(relative_error));
+  if (relative_error !== null) all.push("error " + short(relative_error));
   if (samples !== null) all.push(count(samples) + " samples");
   if (seconds !== null) all.push(clock(seconds));
   return all.join(" or ") || "no limit";

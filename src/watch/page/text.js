@@ -14,6 +14,11 @@ function percent(x, n = 3) {
   return x === null || x === undefined ? "unknown" : digits(100 * x, n) + " %";
 }
 
+/** A share that someone has typed. */
+function short(x) {
+  return Number((100 * x).toPrecision(6)) + " %";
+}
+
 /** A duration: 4.2 s, 42 s, 3 min 20 s, 2 h 5 min. */
 function clock(seconds) {
   const s = Math.round(seconds);
