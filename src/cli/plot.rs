@@ -4,7 +4,6 @@ use super::args::PlotArgs;
 use super::failure::Failure;
 use super::files::{Files, Written};
 use super::say;
-use crate::files::FileError;
 use crate::log::{self, Log};
 use crate::plot::{self, Curve, ErrorPanel, Format, Level, Panel};
 use crate::stats::percent;
@@ -27,12 +26,8 @@ pub fn plot(args: &PlotArgs) -> Result<(), Failure> {
     for path in &args.output {
         files.writes("--output", path)?;
     }
-    let read = |path| Ok::<Log, FileError>(log::read(path)?);
-    let logs: Vec<Log> = args
-        .logs
-        .iter()
-        .map(|p| read(p))
-        .collect::<Result<_, _>>()?;
+    let logs = args.logs.iter().map(|path| log::read(path));
+    let logs: Vec<Log> = logs.collect::<Result<_, _>>()?;
     let mut curves = Vec::new();
     for (path, log) in args.logs.iter().zip(&logs) {
         if log.errors.is_empty() {

@@ -343,7 +343,6 @@ pub fn clock(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::coverage::Rect;
     use crate::film::error::Doubt;
     use crate::run::Forecast;
 

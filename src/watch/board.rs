@@ -21,6 +21,18 @@ pub struct Board {
     runs: Mutex<Vec<Arc<Run>>>,
     /// Counts changes, and wakes who waits for the next.
     changes: watch::Sender<u64>,
+    pace: watch::Sender<Pace>,
+}
+
+/// How soon clients hear of changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// Now and then.
+    Calm,
+    /// At once: the end is near.
+    Hurried,
+    /// For the last time.
+    Last,
 }
 
 impl Default for Board {
@@ -28,6 +40,7 @@ impl Default for Board {
         Self {
             runs: Mutex::default(),
             changes: watch::Sender::new(0),
+            pace: watch::Sender::new(Pace::Calm),
         }
     }
 }
@@ -67,6 +80,21 @@ impl Board {
     /// Wakes at every change.
     pub fn changes(&self) -> watch::Receiver<u64> {
         self.changes.subscribe()
+    }
+
+    /// How soon a client is to hear of changes. Who holds this is a client of the events.
+    pub fn pace(&self) -> watch::Receiver<Pace> {
+        self.pace.subscribe()
+    }
+
+    /// Sets the pace of all clients, and wakes them.
+    pub fn set_pace(&self, pace: Pace) {
+        self.pace.send_replace(pace);
+    }
+
+    /// Clients of the events.
+    pub fn clients(&self) -> usize {
+        self.pace.receiver_count()
     }
 }
 
@@ -386,6 +414,7 @@ impl Run {
 mod tests {
     use super::*;
     use crate::log::Measured;
+    use crate::watch::snapshot::SavedFilm;
 
     fn point(seconds: f64, error: Option<f64>) -> Point {
         Point {
@@ -443,15 +472,8 @@ mod tests {
         assert!(!run.is_wanted() && !run.is_looked_at());
         assert!(run.look().is_none());
         assert!(run.is_wanted() && run.is_looked_at());
-        let film = Film::new([1, 1], Rect::whole([1, 1]), 1);
-        let scene = Scene::default();
-        let provenance = Provenance::new(
-            &scene,
-            "",
-            &Settings::resolve(&scene, &Overrides::default()),
-        );
-        let snapshot = Snapshot::saved(film, provenance);
-        run.publish(Picture::Held(Arc::new(snapshot)), None);
+        let saved = SavedFilm::new("a.npz".into(), Arc::default());
+        run.publish(Picture::Saved(Arc::new(saved)), None);
         assert!(!run.is_wanted() && !run.is_seen());
         assert!(run.look().is_some() && run.is_wanted() && run.is_seen());
     }

@@ -158,7 +158,7 @@ const ABSENT: u32 = u32::MAX << 27;
 /// graphics APIs, and small enough to follow a picture that grows.
 fn rgb9e5(rgb: [f64; 3]) -> u32 {
     const LARGEST: f64 = 511.0 * 128.0;
-    let rgb = rgb.map(|v| v.max(0.0).min(LARGEST));
+    let rgb = rgb.map(|v| v.clamp(0.0, LARGEST));
     let largest = rgb.into_iter().fold(0.0, f64::max);
     if largest == 0.0 {
         return 0;

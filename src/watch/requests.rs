@@ -1,7 +1,7 @@
 //! What the server answers.
 
 use super::answer::{Answer, Reply, busy, empty, not_found, plain, reply, whole};
-use super::board::{Board, Cursor, Run};
+use super::board::{Board, Cursor, Pace, Run};
 use super::download::{Download, plain_name};
 use super::layers::{Layer, View};
 use super::query::{Query, is_known_host};
@@ -40,6 +40,9 @@ const NEWEST: Duration = Duration::from_secs(5);
 
 /// Shortest time between two updates to a client, so that a hundred of them cost nothing.
 const PAUSE: Duration = Duration::from_secs(1);
+
+/// The same when the end is near.
+const SHORT_PAUSE: Duration = Duration::from_millis(50);
 
 /// Without news, this tells whether the client is still there, and keeps a proxy from giving up.
 const HEARTBEAT: Duration = Duration::from_secs(15);
@@ -163,11 +166,12 @@ impl Site {
         let (to, events) = mpsc::channel(1);
         let board = self.board.clone();
         tokio::spawn(async move {
-            let mut changes = board.changes();
+            let (mut changes, mut pace) = (board.changes(), board.pace());
             let mut cursors: Vec<Cursor> = Vec::new();
             let mut text = String::from("retry: 2000\n\n");
             loop {
                 changes.mark_unchanged();
+                let now = *pace.borrow_and_update();
                 for run in board.runs() {
                     if cursors.len() <= run.id {
                         cursors.resize(run.id + 1, Cursor::default());
@@ -181,13 +185,18 @@ impl Site {
                 if !text.is_empty() && to.send(std::mem::take(&mut text).into()).await.is_err() {
                     return;
                 }
-                tokio::time::sleep(PAUSE).await;
+                let pause = match now {
+                    Pace::Calm => PAUSE,
+                    Pace::Hurried => SHORT_PAUSE,
+                    Pace::Last => return,
+                };
                 tokio::select! {
-                    changed = changes.changed() => {
-                        if changed.is_err() {
-                            return;
-                        }
-                    }
+                    () = tokio::time::sleep(pause) => {}
+                    _ = pace.changed() => continue,
+                }
+                tokio::select! {
+                    _ = changes.changed() => {}
+                    _ = pace.changed() => {}
                     () = tokio::time::sleep(HEARTBEAT) => text += ": still here\n\n",
                     () = to.closed() => return,
                 }

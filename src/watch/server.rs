@@ -1,7 +1,7 @@
 //! The thread that serves the page.
 
 use super::address::Address;
-use super::board::Board;
+use super::board::{Board, Pace};
 use super::connection::{Clock, Connection};
 use super::requests::Site;
 use hyper::server::conn::http1;
@@ -29,8 +29,11 @@ const MAKERS: usize = 2;
 /// After the end, those who look at a picture have so long to get the last one.
 const LAST_LOOK: Duration = Duration::from_secs(3);
 
-/// How long the last events get to leave.
-const LAST_EVENTS: Duration = Duration::from_millis(200);
+/// How long clients get to take the last events.
+const LAST_EVENTS: Duration = Duration::from_secs(1);
+
+/// How long what they have taken gets to leave.
+const FLUSH: Duration = Duration::from_millis(100);
 
 /// An address that is taken, but not yet served.
 #[derive(Debug)]
@@ -145,13 +148,22 @@ pub struct Stopped {
 impl Stopped {
     /// Stops it once those who look have seen the last picture, or do not fetch it.
     pub fn after_last_look(self) {
-        let until = Instant::now() + LAST_LOOK;
+        let wait = |time: Duration, waits: &dyn Fn() -> bool| {
+            let until = Instant::now() + time;
+            while waits() && Instant::now() < until {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        };
+        self.board.set_pace(Pace::Hurried);
         let runs = self.board.runs();
-        let waits = || runs.iter().any(|r| r.is_looked_at() && !r.is_seen());
-        while waits() && Instant::now() < until {
-            std::thread::sleep(Duration::from_millis(20));
+        wait(LAST_LOOK, &|| {
+            runs.iter().any(|r| r.is_looked_at() && !r.is_seen())
+        });
+        if self.board.clients() > 0 {
+            self.board.set_pace(Pace::Last);
+            wait(LAST_EVENTS, &|| self.board.clients() > 0);
+            std::thread::sleep(FLUSH);
         }
-        std::thread::sleep(LAST_EVENTS);
     }
 }
 

@@ -97,18 +97,23 @@ impl Running {
         assert!(sent.expect("kill").success());
     }
 
-    /// User and system seconds of the processor that it has used so far.
+    /// Seconds of the processor that it has used so far: all of it, and the server's threads.
     #[cfg(target_os = "linux")]
-    pub fn processor_seconds(&self) -> f64 {
-        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
-        let stat = stat.expect("it is running");
-        // The name, in parentheses, may have blanks.
-        let fields: Vec<&str> = stat.rsplit(')').next().unwrap().split(' ').collect();
-        let ticks: f64 = fields[12..14]
-            .iter()
-            .map(|t| t.parse::<f64>().unwrap())
-            .sum();
-        ticks / 100.0
+    pub fn processor_seconds(&self) -> [f64; 2] {
+        let mut seconds = [0.0; 2];
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.child.id()));
+        for task in tasks.expect("it is running").flatten() {
+            let stat = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
+            // The thread's name stands in parentheses; user and system time are the 12th and 13th number after it.
+            let (name, rest) = stat.rsplit_once(") ").expect("a name");
+            let ticks = rest.split(' ').skip(11).take(2);
+            let used = ticks.map(|t| t.parse::<f64>().unwrap()).sum::<f64>() / 100.0;
+            seconds[0] += used;
+            if name.ends_with("(watch") {
+                seconds[1] += used;
+            }
+        }
+        seconds
     }
 
     /// Its threads.

@@ -3,8 +3,7 @@
 use crate::client::{Running, until};
 use crate::program::Bench;
 use std::io::{Read, Write};
-use std::net::Shutdown;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
 /// The sums of all samples, and thereby every picture, are the same with and without clients.
@@ -17,7 +16,7 @@ fn clients_change_no_bit() {
     let mut looks = 0;
     while running.is_running() {
         for path in ["layers/picture", "layers/error?k=2", "pixel?x=3&y=4"] {
-            if let Ok(mut stream) = std::net::TcpStream::connect(&running.at) {
+            if let Ok(mut stream) = TcpStream::connect(&running.at) {
                 let at = &running.at;
                 let request = format!(
                     "GET /runs/0/{path} HTTP/1.1\r\nHost: {at}\r\nConnection: close\r\n\r\n"
@@ -104,60 +103,42 @@ fn connections_and_threads_are_bounded() {
     assert!(begun.elapsed() < Duration::from_secs(45));
 }
 
-/// What a hundred clients cost that only listen. Each turn measures with and without them, one after the other.
+/// What a hundred clients cost that only listen: the server's share of the time that the processor gives to a render of one thread.
 #[cfg(target_os = "linux")]
 #[test]
-#[ignore = "takes two minutes: cargo test --release --test watch cost -- --ignored --nocapture"]
-fn a_hundred_idle_clients_cost_nothing() {
+fn a_hundred_idle_clients_cost_less_than_a_hundredth() {
     let bench = Bench::new();
     let running = Running::endless(&bench, "--size 256x192");
-    let mut watcher = running.events();
-    watcher.next(|u| u["now"]["samples"].as_f64() > Some(0.0));
-    let mut rate = |seconds: u64| {
-        let mut paths = || {
-            watcher.next(|u| u["now"].is_object())["now"]["paths"]
-                .as_f64()
-                .unwrap()
-        };
-        let (before, used) = (paths(), running.processor_seconds());
+    running
+        .events()
+        .next(|u| u["now"]["samples"].as_f64() > Some(0.0));
+    let mut clients: Vec<_> = (0..100).map(|_| running.events().into_stream()).collect();
+    clients
+        .iter()
+        .for_each(|c| c.set_nonblocking(true).unwrap());
+    // They read, as a browser does.
+    let mut bytes = vec![0; 1 << 16];
+    let mut read = |clients: &mut [TcpStream], seconds: u64| {
         let until = Instant::now() + Duration::from_secs(seconds);
+        let mut events = 0;
         while Instant::now() < until {
-            paths();
+            for client in clients.iter_mut() {
+                let count = client.read(&mut bytes).unwrap_or(0);
+                events += bytes[..count].windows(6).filter(|w| w == b"data: ").count();
+            }
+            std::thread::sleep(Duration::from_millis(100));
         }
-        (paths() - before) / (running.processor_seconds() - used)
+        events
     };
-    let mut ratios = Vec::new();
-    for _ in 0..6 {
-        let alone = rate(10);
-        let clients: Vec<_> = (0..100).map(|_| running.events()).collect();
-        // They read, as a browser does.
-        let stop = AtomicBool::new(false);
-        let with = std::thread::scope(|scope| {
-            scope.spawn(|| {
-                let mut clients: Vec<_> = clients.into_iter().map(|c| c.into_stream()).collect();
-                let mut bytes = vec![0; 1 << 16];
-                clients
-                    .iter()
-                    .for_each(|c| c.set_nonblocking(true).unwrap());
-                while !stop.load(Ordering::Relaxed) {
-                    for client in &mut clients {
-                        let _ = client.read(&mut bytes);
-                    }
-                    std::thread::sleep(Duration::from_millis(100));
-                }
-            });
-            let with = rate(10);
-            stop.store(true, Ordering::Relaxed);
-            with
-        });
-        println!(
-            "paths per second of the processor: alone {alone:.0}, with clients {with:.0}: {:.4}",
-            with / alone
-        );
-        ratios.push(with / alone);
-    }
-    ratios.sort_by(f64::total_cmp);
-    let median = (ratios[2] + ratios[3]) / 2.0;
-    println!("median {median:.4}");
-    assert!(median > 0.99, "{ratios:?}");
+    read(&mut clients, 2);
+    let before = running.processor_seconds();
+    let events = read(&mut clients, 15);
+    let after = running.processor_seconds();
+    let [all, server] = [0, 1].map(|i| after[i] - before[i]);
+    println!(
+        "{server:.2} of {all:.2} s of the processor for {events} events: {:.2} %",
+        100.0 * server / all
+    );
+    assert!(events > 200, "{events} events");
+    assert!(server < 0.01 * all, "{server} of {all} s");
 }
