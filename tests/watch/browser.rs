@@ -248,8 +248,9 @@ fn the_picture_grows_in_a_browser() {
     assert_eq!(width, 390, "something is wider than a phone");
 
     // At the end, the numbers are those of the report.
+    running.interrupt();
     until("end", || {
-        browser.text("state").starts_with("done").then_some(())
+        (browser.text("state") == "interrupted").then_some(())
     });
     let [error, samples] = ["error", "samples"].map(|id| browser.text(id));
     assert_eq!(running.end().0, Some(130));

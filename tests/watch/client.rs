@@ -97,23 +97,20 @@ impl Running {
         assert!(sent.expect("kill").success());
     }
 
-    /// Seconds of the processor that it has used so far: all of it, and the server's threads.
+    /// Seconds of the processor that the server's threads have used so far.
     #[cfg(target_os = "linux")]
-    pub fn processor_seconds(&self) -> [f64; 2] {
-        let mut seconds = [0.0; 2];
+    pub fn server_seconds(&self) -> f64 {
         let tasks = std::fs::read_dir(format!("/proc/{}/task", self.child.id()));
-        for task in tasks.expect("it is running").flatten() {
+        let used = tasks.expect("it is running").flatten().map(|task| {
             let stat = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
             // The thread's name stands in parentheses; user and system time are the 12th and 13th number after it.
-            let (name, rest) = stat.rsplit_once(") ").expect("a name");
+            let Some((_, rest)) = stat.split_once("(watch) ") else {
+                return 0.0;
+            };
             let ticks = rest.split(' ').skip(11).take(2);
-            let used = ticks.map(|t| t.parse::<f64>().unwrap()).sum::<f64>() / 100.0;
-            seconds[0] += used;
-            if name.ends_with("(watch") {
-                seconds[1] += used;
-            }
-        }
-        seconds
+            ticks.map(|t| t.parse::<f64>().unwrap()).sum::<f64>() / 100.0
+        });
+        used.sum()
     }
 
     /// Its threads.
