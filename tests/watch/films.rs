@@ -43,7 +43,7 @@ fn a_film_is_followed_through_all_that_happens_to_it() {
 
     // The beginning is damaged: the last numbers stay.
     fs::write(bench.path("f.npz"), "damaged").unwrap();
-    let damaged = events.next(|u| problem(u) != "");
+    let damaged = events.next(|u| !problem(u).is_empty());
     assert!(problem(&damaged).contains("not a film"), "{damaged}");
     assert_eq!(damaged["now"]["samples"], 4.0);
     assert_eq!(running.get("").status, 200);
@@ -57,7 +57,7 @@ fn a_film_is_followed_through_all_that_happens_to_it() {
     fs::rename(bench.path("new.npz"), bench.path("f.npz")).unwrap();
     events.next(|u| u["now"]["samples"] == 32.0);
     assert_eq!(running.get("runs/0/layers/picture").status, 204);
-    let damaged = events.next(|u| problem(u) != "");
+    let damaged = events.next(|u| !problem(u).is_empty());
     assert!(problem(&damaged).contains("invalid film"), "{damaged}");
     assert!(
         !damaged
