@@ -19,12 +19,12 @@ fn of<'a>(lines: &'a [Value], event: &'a str) -> impl Iterator<Item = &'a Value>
 fn every_line_is_json_and_the_last_has_the_numbers_of_the_report() {
     let bench = Bench::new();
     let run = bench
-        .run("render box.toml --backend cpu --spp 256 --progress json -o a.exr --report a.json --film a.npz")
+        .run("render box.toml --backend cpu --size 96x64 --spp 256 --progress json -o a.exr --report a.json --film a.npz")
         .success();
     let said = lines(std::str::from_utf8(&run.get_output().stderr).unwrap());
     assert_eq!(said[0]["event"], "start");
     assert_eq!(said[0]["title"], "Test box");
-    assert_eq!(said[0]["resolution"], serde_json::json!([24, 16]));
+    assert_eq!(said[0]["resolution"], serde_json::json!([96, 64]));
     assert_eq!(said[0]["target"]["samples"], 256);
     assert!(of(&said, "progress").count() >= 2);
     assert!(of(&said, "message").any(|m| m["text"] == "wrote a.npz, a.exr"));
