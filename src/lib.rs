@@ -90,3 +90,12 @@ pub mod bench;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod log;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod plot;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod watch;

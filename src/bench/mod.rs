@@ -8,7 +8,7 @@ pub mod engines;
 pub mod errors;
 pub mod figure9;
 pub mod measure;
-pub mod plot;
+pub mod panels;
 pub mod record;
 pub mod reference;
 pub mod scaling;

@@ -3,10 +3,12 @@
 mod compare;
 mod films;
 mod render;
+mod watch;
 
 pub use compare::{CompareArgs, RegressArgs};
 pub use films::{DevelopArgs, InfoArgs, MergeArgs};
 pub use render::RenderArgs;
+pub use watch::{PlotArgs, WatchArgs};
 
 use super::bench::args::BenchArgs;
 use super::values;
@@ -57,6 +59,10 @@ pub enum Command {
     MakeScene(MakeSceneArgs),
     /// Measure error against rendering time
     Bench(Box<BenchArgs>),
+    /// Serve a page on which films grow that other processes write
+    Watch(WatchArgs),
+    /// Draw the relative error of runs against time, from their logs
+    Plot(PlotArgs),
     /// List the adapters, the default one, and why the others are not used
     #[command(after_help = "\
 Examples:
@@ -76,14 +82,30 @@ Example:
     Man(ManArgs),
 }
 
+impl Command {
+    /// How much it prints, if it is a long one.
+    pub fn talk(&self) -> Option<Talk> {
+        match self {
+            Self::Render(args) => Some(args.talk),
+            Self::Develop(args) => Some(args.talk),
+            Self::Merge(args) => Some(args.talk),
+            Self::Selftest(args) => Some(args.talk),
+            Self::Compare(args) => Some(args.talk),
+            Self::Regress(args) => Some(args.talk),
+            Self::Bench(args) => Some(args.talk),
+            _ => None,
+        }
+    }
+}
+
 /// How much a long command prints.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Talk {
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
-    /// How to show progress: auto is a bar on a terminal and lines elsewhere, plain is always lines, none is nothing. A line comes
-    /// every 5 seconds at first, later every minute
+    /// How to show progress: auto is a bar on a terminal and lines elsewhere, plain is always lines, json is JSON lines for programs
+    /// (see docs/watch.md), none is nothing. A line comes every 5 seconds at first, later every minute
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto, value_name = "STYLE")]
     pub progress: ProgressStyle,
     /// Threads for the CPU reference or a software adapter [default: as many cores as the process may use]
@@ -159,6 +181,8 @@ pub enum ProgressStyle {
     Auto,
     /// A line now and then.
     Plain,
+    /// Every line of stderr is a JSON object.
+    Json,
     /// Nothing.
     None,
 }

@@ -17,20 +17,13 @@ pub(super) fn prepare(command: &Command) {
         // Turns off LLVM's optimisations. The results have the same bits.
         set("GALLIVM_PERF", || Some("nopt".into()));
     }
-    let talk = match command {
-        Command::Render(args) => Some(args.talk),
-        Command::Selftest(args) => Some(args.talk),
-        Command::Regress(args) => Some(args.talk),
-        Command::Bench(args) => {
-            // A benchmark measures compiling, so no kernel may come from the cache.
-            set("MESA_SHADER_CACHE_DISABLE", || Some("true".into()));
-            Some(args.talk)
-        }
-        _ => None,
-    };
+    if matches!(command, Command::Bench(_)) {
+        // A benchmark measures compiling, so no kernel may come from the cache.
+        set("MESA_SHADER_CACHE_DISABLE", || Some("true".into()));
+    }
     // Read by lavapipe. Its own default is a thread for each core of the machine, also where this process may use fewer of them
     // (a control group's quota, `taskset`).
-    let threads = talk.and_then(|t| t.threads).map(usize::from);
+    let threads = command.talk().and_then(|t| t.threads).map(usize::from);
     let usable = std::thread::available_parallelism().map(usize::from);
     if let Some(threads) = threads.or(usable.ok()) {
         set("LP_NUM_THREADS", || Some(threads.to_string().into()));

@@ -28,6 +28,9 @@ pub enum Failure {
         /// SIGHUP is 1, SIGINT 2, SIGTERM 15.
         signal: u8,
     },
+    /// An address can't be listened at, or reached.
+    #[error("{0}")]
+    Address(String),
     /// The messages have been printed already; only the exit status is left.
     #[error("failed")]
     Said(u8),
@@ -41,7 +44,7 @@ impl Failure {
             Failure::Input(_) | Failure::Scene(_) => 2,
             Failure::Device(_) => 3,
             Failure::File(e) if e.is_content() => 2,
-            Failure::File(_) => 4,
+            Failure::File(_) | Failure::Address(_) => 4,
             Failure::Interrupted { signal } => 128 + signal,
             Failure::Said(status) => *status,
         }

@@ -2,18 +2,22 @@
 
 mod adapters;
 mod args;
+mod audience;
 mod bench;
 mod check;
 mod compare;
 mod develop;
 mod drivers;
 mod ending;
+mod events;
 mod failure;
 mod files;
 mod info;
+mod looks;
 mod make_scene;
 mod merge;
 mod plan;
+mod plot;
 mod progress;
 mod regress;
 mod render;
@@ -25,24 +29,17 @@ mod signals;
 mod stages;
 mod time_left;
 mod values;
+mod watch;
 
 use crate::files::FileError;
 use args::{Cli, Command};
 use clap::Parser;
 use clap::error::{ContextKind, ContextValue};
+pub(crate) use events::say;
 use failure::Failure;
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
-
-/// Writes a line to stderr. Unlike `eprintln!`, it does not panic if stderr is closed.
-macro_rules! say {
-    ($($text:tt)*) => {{
-        use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), $($text)*);
-    }};
-}
-pub(crate) use say;
 
 /// Parses the command line, runs the command, and turns a failure into its message and exit status.
 pub fn main() -> ExitCode {
@@ -55,6 +52,9 @@ pub fn main() -> ExitCode {
             return ExitCode::from(if e.use_stderr() { 2 } else { 0 });
         }
     };
+    if let Some(talk) = cli.command.talk() {
+        events::set_style(&talk);
+    }
     drivers::prepare(&cli.command);
     signals::outlive_size_limits();
     let done = match cli.command {
@@ -68,6 +68,8 @@ pub fn main() -> ExitCode {
         Command::Regress(args) => regress::regress(&args),
         Command::MakeScene(args) => make_scene::make_scene(&args),
         Command::Bench(args) => bench::bench(&args),
+        Command::Watch(args) => watch::watch(&args),
+        Command::Plot(args) => plot::plot(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),
         Command::Completions(args) => shell::completions(&args),

@@ -1,14 +1,18 @@
 //! Plans a render: which pixels, which samples, and when to stop.
 
 use super::args::{Backend, RenderArgs};
+use super::audience::name_of;
 use super::failure::Failure;
 use super::progress::clock;
 use crate::engine::DeviceInfo;
 use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
+use crate::log::{Held, Start, Target};
+use crate::provenance::Provenance;
 use crate::render::plan::end_for;
 use crate::render::{CPU_TIME, DEFAULT_SPP, MAX_SAMPLES};
+use crate::run::Job;
 use crate::scene::Scene;
 use crate::settings::Settings;
 use crate::stats::percent;
@@ -186,6 +190,45 @@ pub fn brief_samples(film: &Film) -> String {
     match film.coverage.samples() {
         (a, b) if a == b => format!("{a} spp"),
         (a, b) => format!("{a} to {b} spp"),
+    }
+}
+
+/// The first event of a run, for logs and those who follow it.
+pub fn start(
+    args: &RenderArgs,
+    provenance: &Provenance,
+    job: &Job,
+    film: &Film,
+    device: &DeviceInfo,
+) -> Start {
+    let length = job.samples.end - job.samples.start;
+    Start {
+        version: env!("CARGO_PKG_VERSION").into(),
+        scene: name_of(&args.scene),
+        title: provenance.scene_title.clone(),
+        scene_hash: provenance.scene_hash.clone(),
+        resolution: film.size,
+        regions: args
+            .region
+            .iter()
+            .map(|r| [r.x0, r.y0, r.x1, r.y1])
+            .collect(),
+        seed: provenance.settings.seed,
+        adapter: device.clone(),
+        film: args.film.as_deref().map(name_of),
+        target: Target {
+            samples: (length < MAX_SAMPLES).then_some(length),
+            seconds: args.time.map(|t| t.as_secs_f64()),
+            relative_error: args.error,
+        },
+        held: Held {
+            samples: if film.coverage.is_empty() {
+                0.0
+            } else {
+                film.coverage.mean()
+            },
+            seconds: provenance.seconds,
+        },
     }
 }
 

@@ -1,9 +1,12 @@
-//! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere.
+//! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere, JSON for programs.
 
 use super::args::{ProgressStyle, Talk};
+use super::events;
+use super::looks::Looks;
 use super::time_left::TimeLeft;
 use crate::film::Film;
 use crate::film::error::RelativeError;
+use crate::log::{Event, Point, Step};
 use crate::run::Tally;
 use crate::stats::percent;
 use console::Term;
@@ -23,15 +26,13 @@ const FIRST_PAUSE: Duration = Duration::from_secs(5);
 /// The longest time between two lines.
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
-/// Computing the error takes at most 1/50 of the time: for large pictures it is computed less often.
-const LOOK_SHARE: u32 = 50;
-
 /// Shows progress on stderr.
 pub struct Progress {
     shown: Shown,
     looks: Looks,
     began: Instant,
     left: TimeLeft,
+    pace: Pace,
 }
 
 /// How it is shown.
@@ -42,6 +43,8 @@ enum Shown {
     Lines(Lines),
     /// A bar.
     Bar(ProgressBar),
+    /// As events, among which are those of every render.
+    Events,
 }
 
 /// Lines already printed.
@@ -68,6 +71,37 @@ fn pause(lines: u32) -> Duration {
     LONGEST_PAUSE.min(FIRST_PAUSE * factor)
 }
 
+/// Decides which events are kept. About twenty for each factor of e in time tell all of a curve on a log axis.
+#[derive(Default)]
+struct Pace {
+    /// Seconds from the beginning to the next one.
+    next: f64,
+}
+
+impl Pace {
+    /// Whether one is due `now` seconds after the beginning, which is then kept.
+    fn is_due(&mut self, now: f64) -> bool {
+        let due = now >= self.next;
+        if due {
+            self.next = now + (0.05 * now).clamp(0.1, LONGEST_PAUSE.as_secs_f64());
+        }
+        due
+    }
+}
+
+/// What the tally alone tells.
+pub fn point(tally: &Tally) -> Point {
+    let paths = tally.counters.paths;
+    Point {
+        samples: tally.samples,
+        seconds: tally.seconds,
+        fraction: tally.forecast.map(|f| f.fraction),
+        paths,
+        paths_per_second: (tally.seconds > 0.0).then(|| paths as f64 / tally.seconds),
+        ..Point::default()
+    }
+}
+
 /// Whether the flags and the terminal call for a bar.
 pub fn has_bar(talk: &Talk) -> bool {
     !talk.quiet && talk.progress == ProgressStyle::Auto && std::io::stderr().is_terminal()
@@ -79,6 +113,7 @@ impl Progress {
         let shown = match talk.progress {
             _ if talk.quiet => Shown::Silent,
             ProgressStyle::None => Shown::Silent,
+            ProgressStyle::Json => Shown::Events,
             _ if has_bar(talk) => {
                 let style =
                     BarStyle::with_template("{wide_bar} {msg}").unwrap_or(BarStyle::default_bar());
@@ -95,6 +130,7 @@ impl Progress {
             looks: Looks::default(),
             began: Instant::now(),
             left: TimeLeft::default(),
+            pace: Pace::default(),
         }
     }
 
@@ -109,10 +145,10 @@ impl Progress {
         let now = self.began.elapsed().as_secs_f64();
         let left = self.left.after(now, tally.forecast.map(|f| f.left));
         match &mut self.shown {
-            Shown::Silent => {}
+            Shown::Silent | Shown::Events => {}
             Shown::Lines(lines) => {
                 if lines.is_due() {
-                    super::say!("{}", line(tally, left, self.looks.error(film, tally)));
+                    events::only_stderr(&line(tally, left, self.looks.error(film, tally)));
                 }
             }
             Shown::Bar(bar) => {
@@ -123,15 +159,26 @@ impl Progress {
                 bar.set_message(beside_bar(tally, left, error, columns()));
             }
         }
+        if events::are_heard() {
+            let kept = self.pace.is_due(now);
+            let measured = self.looks.measured(film, tally, kept);
+            let point = Point {
+                seconds_left: left,
+                error: measured,
+                ..point(tally)
+            };
+            events::emit(&Event::Progress(point), kept);
+        }
     }
 
     /// Shows that `done` of `of` steps are done, and the name of the next.
     pub fn step(&mut self, done: usize, of: usize, next: &str) {
         match &mut self.shown {
             Shown::Silent => {}
+            Shown::Events => self.tell_step(done as f64 / of.max(1) as f64, next),
             Shown::Lines(lines) => {
                 if lines.is_due() {
-                    super::say!("{done} of {of} done, next: {next}");
+                    events::only_stderr(&format!("{done} of {of} done, next: {next}"));
                 }
             }
             Shown::Bar(bar) => {
@@ -145,15 +192,23 @@ impl Progress {
     pub fn share(&mut self, fraction: f64, text: &str) {
         match &mut self.shown {
             Shown::Silent => {}
+            Shown::Events => self.tell_step(fraction, text),
             Shown::Lines(lines) => {
                 if lines.is_due() {
-                    super::say!("{text}, {}", done(fraction));
+                    events::only_stderr(&format!("{text}, {}", done(fraction)));
                 }
             }
             Shown::Bar(bar) => {
                 bar.set_position(((fraction * STEPS as f64) as u64).min(STEPS - 1));
                 bar.set_message(cut(text, room(columns())));
             }
+        }
+    }
+
+    fn tell_step(&mut self, fraction: f64, doing: &str) {
+        if self.pace.is_due(self.began.elapsed().as_secs_f64()) {
+            let doing = doing.into();
+            events::emit(&Event::Step(Step { fraction, doing }), true);
         }
     }
 
@@ -189,52 +244,6 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.finish();
-    }
-}
-
-/// The picture's relative error when it was last computed.
-#[derive(Default)]
-struct Looks {
-    black: bool,
-    last: Option<Look>,
-}
-
-struct Look {
-    /// Samples per pixel at that time.
-    samples: f64,
-    error: RelativeError,
-    /// When the computation was done, and how long it took.
-    done: Instant,
-    took: Duration,
-}
-
-impl Looks {
-    /// The picture's relative error: computed if that is due, else extrapolated from the last computation. `None` while some
-    /// pixels have no samples.
-    fn error(&mut self, film: &Film, tally: &Tally) -> Option<RelativeError> {
-        if !tally.complete {
-            return None;
-        }
-        let due = |l: &Look| l.done.elapsed() >= l.took * LOOK_SHARE;
-        if self.last.as_ref().is_none_or(due) {
-            let begun = Instant::now();
-            let error = film.relative_error().of_black(self.black);
-            self.last = Some(Look {
-                samples: tally.samples,
-                error,
-                done: Instant::now(),
-                took: begun.elapsed(),
-            });
-        }
-        let look = self.last.as_ref()?;
-        // The error falls with the square root of the number of samples.
-        let since = (look.samples / tally.samples).sqrt().min(1.0);
-        let scaled = |x: f64| x * since;
-        Some(RelativeError {
-            value: look.error.value.map(scaled),
-            uncertainty: look.error.uncertainty.map(scaled),
-            ..look.error
-        })
     }
 }
 
@@ -334,7 +343,6 @@ pub fn clock(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::coverage::Rect;
     use crate::film::error::Doubt;
     use crate::run::Forecast;
 
@@ -379,6 +387,16 @@ mod tests {
         assert!(!lines.is_due());
         lines.last -= FIRST_PAUSE;
         assert!(lines.is_due() && !lines.is_due());
+    }
+
+    #[test]
+    fn kept_events_are_evenly_spread_over_the_logarithm_of_time() {
+        let mut pace = Pace::default();
+        let calls = (0..36_000).map(|n| f64::from(n) * 0.1);
+        let kept: Vec<f64> = calls.filter(|now| pace.is_due(*now)).collect();
+        assert!((140..220).contains(&kept.len()), "{}", kept.len());
+        let longest = kept.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        assert!((59.0..61.0).contains(&longest), "{longest}");
     }
 
     #[test]
@@ -429,47 +447,6 @@ mod tests {
         let short = cut(name, room(60));
         assert_eq!(short.chars().count(), 49);
         assert!(short.ends_with('\u{2026}'));
-    }
-
-    /// The error is extrapolated while computing it is expensive, and computed again as soon as it is cheap.
-    #[test]
-    fn the_shown_error_is_never_out_of_date() {
-        let rect = Rect::whole([1, 1]);
-        let mut film = Film::new([1, 1], rect, 1);
-        film.put_samples(rect, 0..4, vec![[[0.5, 0.5, 0.5, 0.25]; 4]]);
-        let mut tally = Tally {
-            samples: 256.0,
-            ..Tally::default()
-        };
-        let looked = |took| Looks {
-            black: false,
-            last: Some(Look {
-                samples: 64.0,
-                error: RelativeError {
-                    value: Some(0.2),
-                    uncertainty: Some(0.02),
-                    doubt: None,
-                },
-                done: Instant::now(),
-                took,
-            }),
-        };
-        let hour = Duration::from_secs(3600);
-        assert_eq!(
-            looked(hour).error(&film, &tally),
-            None,
-            "some pixels have no samples"
-        );
-        tally.complete = true;
-        let between = looked(hour).error(&film, &tally).and_then(|e| describe(&e));
-        assert_eq!(
-            between.as_deref(),
-            Some("relative error 10.0 % \u{b1} 1.0 %")
-        );
-        for mut looks in [looked(Duration::ZERO), Looks::default()] {
-            let error = looks.error(&film, &tally).and_then(|e| describe(&e));
-            assert_eq!(error.as_deref(), Some("relative error 0 %"));
-        }
     }
 
     #[test]

@@ -1,9 +1,12 @@
 //! `etendue render`: renders a scene file to pictures, a film and a report.
 
 use super::args::{Backend, RenderArgs};
+use super::audience::{self, Audience};
+use super::events;
 use super::failure::Failure;
 use super::files::{Files, Written, write_text};
-use super::progress::{Progress, clock};
+use super::looks::measured;
+use super::progress::{Progress, clock, point};
 use super::saver::{Saver, longest_call};
 use super::say;
 use super::signals::Signals;
@@ -14,17 +17,18 @@ use crate::files::FileError;
 use crate::files::lock::Lock;
 use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::error::Doubt;
+use crate::film::error::{Doubt, RelativeError};
 use crate::film::pilot::Pilot;
 use crate::gpu::Making;
 use crate::kernel::{self, Access};
+use crate::log::{End, Event, Point};
 use crate::output::Format;
 use crate::output::report::{self, Report, Seconds};
 use crate::output::store;
 use crate::provenance::Provenance;
 use crate::render::backend::{self, Chosen};
 use crate::render::{self, memory};
-use crate::run::{self, Job, Run, StopReason};
+use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::{Canonical, Scene, check, parse};
 use crate::settings::{Changed, Settings};
 use crate::world::World;
@@ -40,12 +44,34 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
 
     // Check everything that can be checked before the first sample.
     let outputs = outputs(args);
-    let mut files = check_files(args, &outputs)?;
+    let files = check_files(args, &outputs)?;
     plan::check_flags(args.backend, args.adapter.as_deref())?;
     super::set_threads(args.talk.threads);
     let signals =
         Signals::install().map_err(|e| Failure::Device(format!("cannot handle signals: {e}")))?;
+    let mut audience = Audience::gather(args)?;
+    let done = render_before(&mut audience, args, begun, &outputs, files, &signals);
+    // Those who follow hear of a failure before they are left.
+    let done = done.map_err(|failure| {
+        failure.print();
+        match failure {
+            Failure::Interrupted { .. } => failure,
+            other => Failure::Said(other.status()),
+        }
+    });
+    audience.leave();
+    done
+}
 
+/// Renders a scene before an audience.
+fn render_before(
+    audience: &mut Audience,
+    args: &RenderArgs,
+    begun: Instant,
+    outputs: &[PathBuf],
+    mut files: Files,
+    signals: &Signals,
+) -> Result<(), Failure> {
     // Read the scene, and the film if it exists.
     let mut stages = Stages::new(&args.talk);
     stages.begin(format!("reading {}", args.scene.display()));
@@ -131,6 +157,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
         call: longest_call(args),
         adaptive: args.adaptive.then_some(settings.seed),
     };
+    audience.open_log(args.log.as_deref(), !film.coverage.is_empty())?;
+    let start = plan::start(args, &provenance, &job, &film, chosen.engine.device());
+    audience.start(start, &provenance, chosen.engine.device());
     if !args.talk.quiet
         && let Some(note) = &chosen.note
     {
@@ -150,10 +179,12 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let ended = run.go(|film, tally| {
         progress.show(film, tally);
         saver.meanwhile(film, tally, &progress);
+        audience.meanwhile(film, tally, &progress);
         Ok::<(), Failure>(())
     });
     let tally = run.tally;
     progress.finish();
+    audience.show_end(&film, &tally);
     if matches!(ended, Ok(StopReason::Interrupted)) && tally.counters.paths > 0 && !args.talk.quiet
     {
         say!("interrupted: saving what there is; another signal would lose it");
@@ -180,6 +211,9 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             written.note(path, format.write(path, &film, &provenance, &options));
         }
     }
+    // This looks at every pixel.
+    let error = provenance.error(&film);
+    events::emit(&ended_so(stop_reason(args, reason), &tally, &error), true);
     if let Some(path) = &args.report {
         let facts = report::Run {
             scene: args.scene.display().to_string(),
@@ -198,8 +232,6 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
             written.note(path, Err(e));
         }
     }
-    // This looks at every pixel.
-    let error = provenance.error(&film);
     if !args.talk.quiet {
         ending::say_end(args, &film, &error, &tally, reason, written.list());
         let is_png = |path: &PathBuf| Format::from_path(path) == Ok(Format::Png);
@@ -270,6 +302,7 @@ fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure>
     if let Some(path) = &args.film {
         files.writes_film("--film", path)?;
     }
+    audience::check_files(args, &mut files)?;
     if let Some(path) = &args.dump_wgsl {
         files.writes_text("--dump-wgsl", path)?;
     }
@@ -408,6 +441,18 @@ fn say_other_adapters(args: &RenderArgs, held: &Provenance, device: &DeviceInfo)
             device.name
         );
     }
+}
+
+/// The last event of a run.
+fn ended_so(reason: &str, tally: &Tally, error: &RelativeError) -> Event {
+    let point = Point {
+        fraction: None,
+        seconds_left: None,
+        error: measured(error, tally.samples, tally.seconds),
+        ..point(tally)
+    };
+    let stop_reason = reason.into();
+    Event::End(End { stop_reason, point })
 }
 
 /// The report's word for what ended the run.

@@ -4,6 +4,7 @@
 use crate::film::coverage::Rect;
 use crate::render::MAX_SAMPLES;
 use crate::settings::LightParts;
+use crate::watch::Address;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -132,6 +133,11 @@ pub fn limit(text: &str) -> Result<f64, String> {
         Ok(x) if x >= 0.0 && x.is_finite() => Ok(x * scale),
         _ => Err("expected a number such as 0.02 or 2%, 0 or more".into()),
     }
+}
+
+/// An address with its port: `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`.
+pub fn address(text: &str) -> Result<Address, String> {
+    text.parse()
 }
 
 /// A number of samples, 1..=[`MAX_SAMPLES`].

@@ -52,6 +52,13 @@ impl FileError {
         }
     }
 
+    /// What is wrong, without the file's name.
+    pub fn message(&self) -> &str {
+        match self {
+            Self::Io { message, .. } | Self::Content { message, .. } => message,
+        }
+    }
+
     /// Whether the content is at fault, not access to it.
     pub fn is_content(&self) -> bool {
         matches!(self, Self::Content { .. })

@@ -5,7 +5,7 @@ use super::metadata::{Value, entries};
 use super::pixels::{Pixels, finite};
 use crate::files::FileError;
 use crate::files::atomic;
-use crate::film::Film;
+use crate::film::{Estimate, Film};
 use crate::provenance::Provenance;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Image,
@@ -14,10 +14,18 @@ use exr::prelude::{
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// The channels of a file with errors and samples.
-const ALL_CHANNELS: [&str; 9] = [
+/// The channels of a picture with errors and samples.
+pub const CHANNELS: [&str; 9] = [
     "R", "G", "B", "A", "error.R", "error.G", "error.B", "error.Y", "samples",
 ];
+
+/// The values of a pixel in [`CHANNELS`]: 0 in all of them where there are no samples.
+pub fn channel_values(estimate: Option<Estimate>) -> [f32; CHANNELS.len()] {
+    estimate.map_or([0.0; CHANNELS.len()], |e| {
+        let ([r, g, b], [er, eg, eb, ey]) = (e.mean.map(finite), e.error.map(finite));
+        [r, g, b, 1.0, er, eg, eb, ey, e.samples as f32]
+    })
+}
 
 /// Writes the whole picture in ZIP-compressed scan lines, which every reader knows. All channels are `R G B A`, `error.R error.G
 /// error.B error.Y` (standard errors of the mean, `Y` of the luminance) and `samples`, as 32-bit floats: counts are exact up to
@@ -32,18 +40,15 @@ pub fn write_exr(
     channels: ExrChannels,
 ) -> Result<(), FileError> {
     let names: &[&str] = match channels {
-        ExrChannels::All => &ALL_CHANNELS,
-        ExrChannels::Rgb | ExrChannels::RgbHalf => &ALL_CHANNELS[..3],
+        ExrChannels::All => &CHANNELS,
+        ExrChannels::Rgb | ExrChannels::RgbHalf => &CHANNELS[..3],
     };
     let size = Vec2(film.size[0] as usize, film.size[1] as usize);
     let mut values = vec![Vec::with_capacity(size.area()); names.len()];
     let pixels = Pixels::new(film);
     for y in 0..film.size[1] {
         for x in 0..film.size[0] {
-            let of_pixel = pixels.at(x, y).map_or([0.0; ALL_CHANNELS.len()], |e| {
-                let ([r, g, b], [er, eg, eb, ey]) = (e.mean.map(finite), e.error.map(finite));
-                [r, g, b, 1.0, er, eg, eb, ey, e.samples as f32]
-            });
+            let of_pixel = channel_values(pixels.at(x, y));
             for (channel, value) in values.iter_mut().zip(of_pixel) {
                 channel.push(value);
             }

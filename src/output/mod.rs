@@ -10,7 +10,7 @@ mod png_read;
 pub mod report;
 pub mod store;
 
-pub use exr::write_exr;
+pub use exr::{CHANNELS, channel_values, write_exr};
 pub use exr_read::{ExrHeader, Picture, read_exr, read_exr_header};
 pub(crate) use metadata::entries;
 pub(crate) use pixels::Pixels;

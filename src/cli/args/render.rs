@@ -7,6 +7,7 @@ use crate::film::coverage::Rect;
 use crate::render::MAX_SHADOW_RAYS;
 use crate::scene::LARGEST_STRATA;
 use crate::settings::{Integrator, LightParts, Overrides};
+use crate::watch::Address;
 use clap::{Args, ValueEnum};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -28,6 +29,8 @@ Examples:
   etendue render scene.toml --samples 0..512 --film a.npz
   etendue render scene.toml --samples 512..1024 --film b.npz
       splits a picture across two machines; then: etendue merge whole.npz a.npz b.npz
+  etendue render scene.toml --error 1% --listen 127.0.0.1:8080 --log scene.jsonl
+      serves a page on which the picture grows; then: etendue plot scene.jsonl -o curve.svg
   etendue render scene.toml --region 0,0,64,64 --region 100,80,164,144
       renders two regions, bit-identical to the same pixels of the whole picture
 
@@ -52,6 +55,19 @@ pub struct RenderArgs {
     /// Rewrite this .png every few seconds, for an image viewer that reloads it
     #[arg(long, value_name = "FILE.png")]
     pub watch: Option<PathBuf>,
+    /// Serve a page on which the picture grows, such as 127.0.0.1:8080; port 0 is any free one. Everyone who can reach the address can
+    /// see it
+    #[arg(long, value_name = "ADDR:PORT", value_parser = values::address)]
+    pub listen: Option<Address>,
+    /// With --listen: answer requests for this host too, as a reverse proxy passes them on. Repeatable
+    #[arg(long, value_name = "NAME", requires = "listen")]
+    pub host: Vec<String>,
+    /// Send the picture and its layers to tev, the image viewer, as they grow
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::address)]
+    pub tev: Option<Address>,
+    /// Keep the progress in this file, as JSON lines: see etendue plot. The log of a film that is resumed goes on
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
     /// Write a run summary as JSON, to stdout with -
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,

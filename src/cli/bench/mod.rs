@@ -10,14 +10,14 @@ use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::say;
 use super::signals::Signals;
-use crate::bench::plot::{self, ErrorPanel, Panel};
 use crate::bench::{
     Contender, EngineKind, Entrant, Plan, Reference, Results, Unready, mean_path_length, measure,
-    record, reference, table,
+    panels, record, reference, table,
 };
 use crate::engine::EngineError;
 use crate::gpu::Gpu;
 use crate::kernel::Access;
+use crate::plot::{self, Panel};
 use crate::provenance::hash::scene_hash;
 use crate::render::{backend, memory};
 use crate::run::Tally;
@@ -199,7 +199,7 @@ impl Bench<'_> {
         );
         self.show(&table::text(&results, self.args.wide))?;
         self.json += &record::lines(&results);
-        panels.push(Panel::Error(ErrorPanel::new(&results)));
+        panels.push(Panel::Error(panels::errors(&results)));
         match ended {
             Ok(true) => Ok(()),
             Ok(false) => Err(self.interrupted()),

@@ -1,12 +1,12 @@
 //! `etendue bench --scaling`: seconds per path against the number of objects.
 
 use super::{Bench, TIME, once};
-use crate::bench::plot::{Panel, ScalingPanel};
 use crate::bench::scaling::{self, Plan, Scaling, Series, text};
-use crate::bench::{EngineKind, Unready, record};
+use crate::bench::{EngineKind, Unready, panels as draw, record};
 use crate::cli::failure::Failure;
 use crate::engine::EngineError;
 use crate::kernel::Access;
+use crate::plot::Panel;
 use crate::render::memory;
 use crate::settings::Settings;
 use crate::world::World;
@@ -37,7 +37,7 @@ impl Bench<'_> {
             );
             self.show(&text::text(&scaling))?;
             self.json += &record::scaling_lines(&scaling);
-            panels.push(Panel::Scaling(ScalingPanel::new(&scaling)));
+            panels.push(Panel::Scaling(draw::scaling(&scaling)));
             match ended {
                 Ok(true) => {}
                 Ok(false) | Err(Unready::Engine(EngineError::Stopped)) => {

@@ -4,7 +4,7 @@ mod chart;
 mod error;
 mod scaling;
 
-pub use error::{Curve, ErrorPanel};
+pub use error::{Curve, ErrorPanel, Level};
 pub use scaling::ScalingPanel;
 
 use crate::files::{FileError, atomic};

@@ -1,68 +1,49 @@
-//! Error against seconds, a panel for each scene.
+//! Relative error against seconds.
 
 use super::Drawn;
 use super::chart::{Axes, Dashes, Pen, Sample, plain, range};
-use crate::bench::summary::Point;
-use crate::bench::{EngineKind, Results};
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::PathElement;
 use plotters::prelude::DrawingBackend;
-use std::path::Path;
 
-/// What is drawn of one scene.
+/// What is drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorPanel {
     /// Above it.
     pub title: String,
-    /// A line for each engine.
+    /// One for each engine, or run.
     pub curves: Vec<Curve>,
-    /// Relative error of the reference itself.
-    pub floor: Option<f64>,
+    /// A level to compare the curves with.
+    pub level: Option<Level>,
 }
 
-/// One engine's errors.
+/// A dashed line across the panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// What it is, in the legend.
+    pub name: String,
+    /// The relative error, above 0.
+    pub error: f64,
+}
+
+/// How one error falls.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// The engine.
-    pub engine: EngineKind,
-    /// Seconds, relative error, and its standard deviation over seeds; all but the last above 0.
+    /// In the legend.
+    pub name: String,
+    /// Seconds, relative error, and its standard deviation; all but the last above 0.
     pub points: Vec<[f64; 3]>,
 }
 
 impl ErrorPanel {
-    /// The data to draw from these results.
-    pub fn new(results: &Results) -> Self {
-        let points = results.points();
-        let curve = |engine: EngineKind| {
-            let drawn = |p: &Point| {
-                let error = p.true_relative_error?;
-                Some([p.seconds.mean, error.mean, error.sd.unwrap_or(0.0)])
-            };
-            Curve {
-                engine,
-                points: points
-                    .iter()
-                    .filter(|p| p.engine == engine)
-                    .filter_map(drawn)
-                    .filter(|p| p[0] > 0.0 && p[1] > 0.0)
-                    .collect(),
-            }
-        };
-        let name = Path::new(&results.scene).file_stem();
-        Self {
-            title: name.map_or(results.scene.clone(), |n| n.to_string_lossy().into()),
-            curves: results.engines().into_iter().map(curve).collect(),
-            floor: results.reference.truth.noise_floor().filter(|&f| f > 0.0),
-        }
-    }
-
     /// Least and greatest seconds and errors, widened to leave room; 1 around nothing.
     fn ranges(&self) -> [[f64; 2]; 2] {
         let points = || self.curves.iter().flat_map(|c| &c.points);
         let x = range(points().map(|p| p[0]), [0.7, 1.4]);
         let ends = |p: &[f64; 3]| [p[1] + p[2], (p[1] - p[2]).max(0.5 * p[1])];
-        let y = range(points().flat_map(ends).chain(self.floor), [0.8, 1.6]);
+        let level = self.level.as_ref().map(|l| l.error);
+        let y = range(points().flat_map(ends).chain(level), [0.8, 1.6]);
         [x, y]
     }
 }
@@ -79,15 +60,11 @@ impl ErrorPanel {
         // The guide lies below the end of the first curve, where costs besides the samples matter least.
         let last = self.curves.iter().find_map(|c| c.points.last());
         let guide = last.map(|_| (Sample::Dashes(Dashes::LONG), "slope -1/2".to_owned()));
-        let floor = self.floor.map(|_| {
-            (
-                Sample::Dashes(Dashes::SHORT),
-                "noise of the reference".to_owned(),
-            )
-        });
+        let level = self.level.as_ref();
+        let level = level.map(|l| (Sample::Dashes(Dashes::SHORT), l.name.clone()));
         let curves = self.curves.iter().enumerate();
-        let curves = curves.map(|(i, c)| (Sample::Curve(i), c.engine.name().to_owned()));
-        let legend: Vec<_> = curves.chain(guide).chain(floor).collect();
+        let curves = curves.map(|(i, c)| (Sample::Curve(i), c.name.clone()));
+        let legend: Vec<_> = curves.chain(guide).chain(level).collect();
         let area = pen.legend(area, &legend)?;
         let mut chart = pen.axes(
             &area,
@@ -106,8 +83,8 @@ impl ErrorPanel {
             let ends = [x0.max(at(y1)), x1.min(at(y0))].map(guide);
             pen.dashes(&mut chart, ends, Dashes::LONG)?;
         }
-        if let Some(floor) = self.floor {
-            pen.dashes(&mut chart, [(x0, floor), (x1, floor)], Dashes::SHORT)?;
+        if let Some(Level { error, .. }) = self.level {
+            pen.dashes(&mut chart, [(x0, error), (x1, error)], Dashes::SHORT)?;
         }
         for (i, curve) in self.curves.iter().enumerate() {
             let thin = pen.line(Pen::colour(i), 1.2);
@@ -128,8 +105,8 @@ mod tests {
     use std::io;
 
     fn panel(floor: Option<f64>) -> ErrorPanel {
-        let curve = |engine, cost: f64, error: f64| Curve {
-            engine,
+        let curve = |name: &str, cost: f64, error: f64| Curve {
+            name: name.into(),
             points: (0..7)
                 .map(|k| {
                     let n = f64::from(1 << k);
@@ -140,12 +117,15 @@ mod tests {
         ErrorPanel {
             title: "synthetic".into(),
             curves: vec![
-                curve(EngineKind::GpuBaked, 0.05, 0.8),
-                curve(EngineKind::GpuBuffers, 0.11, 0.8),
-                curve(EngineKind::Cpu, 0.5, 0.78),
-                curve(EngineKind::CpuBrute, 0.4, 5.0),
+                curve("gpu-baked", 0.05, 0.8),
+                curve("gpu-buffers", 0.11, 0.8),
+                curve("cpu", 0.5, 0.78),
+                curve("cpu-brute", 0.4, 5.0),
             ],
-            floor,
+            level: floor.map(|error| Level {
+                name: "noise of the reference".into(),
+                error,
+            }),
         }
     }
 
@@ -190,10 +170,10 @@ mod tests {
         let empty = ErrorPanel {
             title: "none".into(),
             curves: vec![Curve {
-                engine: EngineKind::Cpu,
+                name: "cpu".into(),
                 points: Vec::new(),
             }],
-            floor: None,
+            level: None,
         };
         assert!(svg(&[Panel::Error(empty)]).is_ok());
         assert!(svg(&[]).is_ok());
