@@ -136,6 +136,43 @@ fn a_film_and_its_picture_say_the_same() {
 }
 
 #[test]
+fn a_report_has_the_verdict_for_scripts() {
+    let p = Pictures::new();
+    let a = p.put("a.exr", &whole(1, |_, _| 1.0));
+    let c = p.put("c.exr", &whole(3, patch));
+    let output = run(&a, &c, &["--report", "-"])
+        .code(1)
+        .stderr(contains("different in "));
+    let json: serde_json::Value =
+        serde_json::from_slice(&output.get_output().stdout).expect("JSON and nothing else");
+    assert_eq!(
+        (&json["same"], &json["identical"]),
+        (&false.into(), &false.into())
+    );
+    assert!(
+        json["sentence"]
+            .as_str()
+            .is_some_and(|s| s.starts_with("different in "))
+    );
+    let finding = &json["verdict"]["findings"][0];
+    assert!(finding["rect"]["x0"].as_u64().is_some_and(|x| x >= 16) && finding["whole"] == false);
+    let [before, after] = [0, 1].map(|k| finding["means"][k].as_f64().expect("a number"));
+    assert!(after > before && finding["p"].as_f64() < json["verdict"]["alpha"].as_f64());
+    assert!(json["metrics"]["relative_rmse"].as_f64() > Some(0.0) && json["notes"].is_array());
+    // Without errors there is no verdict.
+    let b = p.put("b.png", &whole(2, |_, _| 0.5));
+    let file = p.path("report.json");
+    let flags = ["--max-flip", "1", "--report", file.to_str().expect("a name")];
+    run(&a, &b, &flags).code(0);
+    let text = std::fs::read(&file).expect("a report");
+    let json: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+    assert!(json["verdict"].is_null() && json["same"] == true);
+    run(&a, &b, &["--report", a.to_str().expect("a name")])
+        .code(2)
+        .stderr(contains("would overwrite"));
+}
+
+#[test]
 fn pictures_without_noise_need_limits() {
     let p = Pictures::new();
     let a = p.put("a.exr", &whole(1, |_, _| 0.5));

@@ -82,8 +82,8 @@ pub struct Talk {
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
-    /// How to show progress: auto is a bar on a terminal and lines elsewhere, plain is always lines, none is nothing. A line comes
-    /// every 5 seconds at first, later every minute
+    /// How to show progress: auto is a bar on a terminal and lines elsewhere, plain is always lines, json is lines of JSON for programs,
+    /// none is nothing. A line comes every 5 seconds at first, later every minute; one of JSON every quarter of a second
     #[arg(long, value_enum, default_value_t = ProgressStyle::Auto, value_name = "STYLE")]
     pub progress: ProgressStyle,
     /// Threads for the CPU reference or a software adapter [default: as many cores as the process may use]
@@ -159,6 +159,8 @@ pub enum ProgressStyle {
     Auto,
     /// A line now and then.
     Plain,
+    /// A JSON object in a line, four times a second.
+    Json,
     /// Nothing.
     None,
 }

@@ -2,7 +2,7 @@
 
 use super::args::CompareArgs;
 use super::failure::Failure;
-use super::files::Files;
+use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::{say, write_stdout};
 use crate::compare::{LABELS, Limits, Picture, compare as compare_pictures, html};
@@ -20,6 +20,9 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     files.reads("a picture to compare", &args.b)?;
     if let Some(path) = &args.html {
         files.writes("--html", path)?;
+    }
+    if let Some(path) = &args.report {
+        files.writes_text("--report", path)?;
     }
     super::set_threads(args.talk.threads);
     let mut progress = Progress::new(&args.talk);
@@ -41,7 +44,15 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     }
     progress.finish();
     if !(args.talk.quiet && comparison.same()) {
-        write_stdout(&comparison.report())?;
+        let text = comparison.report();
+        if args.report.as_deref().is_some_and(is_stdout) {
+            say!("{}", text.trim_end());
+        } else {
+            write_stdout(&text)?;
+        }
+    }
+    if let Some(path) = &args.report {
+        write_text(path, &comparison.to_json())?;
     }
     if let Some(path) = &args.html {
         let page = html::page(&a, &b, LABELS, &comparison);

@@ -1,5 +1,7 @@
 //! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere.
 
+mod json;
+
 use super::args::{ProgressStyle, Talk};
 use super::time_left::TimeLeft;
 use crate::film::Film;
@@ -40,6 +42,8 @@ enum Shown {
     Silent,
     /// A line now and then.
     Lines(Lines),
+    /// A line of JSON four times a second.
+    Json(json::Lines),
     /// A bar.
     Bar(ProgressBar),
 }
@@ -79,6 +83,7 @@ impl Progress {
         let shown = match talk.progress {
             _ if talk.quiet => Shown::Silent,
             ProgressStyle::None => Shown::Silent,
+            ProgressStyle::Json => Shown::Json(json::Lines::new()),
             _ if has_bar(talk) => {
                 let style =
                     BarStyle::with_template("{wide_bar} {msg}").unwrap_or(BarStyle::default_bar());
@@ -115,6 +120,13 @@ impl Progress {
                     super::say!("{}", line(tally, left, self.looks.error(film, tally)));
                 }
             }
+            Shown::Json(lines) => lines.say(|| json::Line {
+                fraction: tally.forecast.map(|f| f.fraction),
+                seconds_left: left,
+                samples: Some(tally.samples),
+                relative_error: self.looks.error(film, tally).and_then(|e| e.value),
+                what: None,
+            }),
             Shown::Bar(bar) => {
                 let fraction = tally.forecast.map_or(0.0, |f| f.fraction);
                 let done = (fraction * STEPS as f64) as u64;
@@ -134,6 +146,11 @@ impl Progress {
                     super::say!("{done} of {of} done, next: {next}");
                 }
             }
+            Shown::Json(lines) => lines.say(|| json::Line {
+                fraction: Some(done as f64 / of.max(1) as f64),
+                what: Some(next),
+                ..json::Line::default()
+            }),
             Shown::Bar(bar) => {
                 bar.set_position(STEPS * done as u64 / of.max(1) as u64);
                 bar.set_message(cut(next, room(columns())));
@@ -150,6 +167,11 @@ impl Progress {
                     super::say!("{text}, {}", done(fraction));
                 }
             }
+            Shown::Json(lines) => lines.say(|| json::Line {
+                fraction: Some(fraction),
+                what: Some(text),
+                ..json::Line::default()
+            }),
             Shown::Bar(bar) => {
                 bar.set_position(((fraction * STEPS as f64) as u64).min(STEPS - 1));
                 bar.set_message(cut(text, room(columns())));

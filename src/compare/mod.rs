@@ -8,6 +8,7 @@ mod grid;
 pub mod html;
 pub mod metrics;
 mod picture;
+mod report;
 mod text;
 pub mod verdict;
 

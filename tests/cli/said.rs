@@ -280,6 +280,25 @@ fn the_watch_picture_is_the_final_one_at_the_end() {
     assert_eq!(a.unwrap(), w.unwrap());
 }
 
+#[test]
+fn progress_for_programs_is_json() {
+    let bench = Bench::new();
+    let output = bench
+        .run("render box.toml --backend cpu --time 1s --progress json -o a.png")
+        .success();
+    let said = String::from_utf8(output.get_output().stderr.clone()).expect("text");
+    let lines: Vec<serde_json::Value> = said
+        .lines()
+        .filter(|l| l.starts_with('{'))
+        .map(|l| serde_json::from_str(l).expect("JSON"))
+        .collect();
+    assert!((2..=4).contains(&lines.len()), "{said}");
+    let fractions: Vec<f64> = lines.iter().filter_map(|l| l["fraction"].as_f64()).collect();
+    assert!(fractions.len() > 1 && fractions.is_sorted(), "{said}");
+    assert!(fractions.iter().all(|f| (0.0..1.0).contains(f)), "{said}");
+    assert!(lines.iter().all(|l| l["samples"].as_f64() > Some(0.0)), "{said}");
+}
+
 /// On a terminal, long stages are shown until they end. They are not shown elsewhere, or without a progress bar.
 #[cfg(target_os = "linux")]
 #[test]

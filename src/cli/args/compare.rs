@@ -37,6 +37,9 @@ pub struct CompareArgs {
     /// Write an HTML page with both pictures, their difference and all numbers
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Write the verdict and all numbers as JSON. With - they go to stdout, and the text goes to stderr
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
 
     /// How much to print.
     #[command(flatten)]
