@@ -162,7 +162,12 @@ fn a_report_has_the_verdict_for_scripts() {
     // Without errors there is no verdict.
     let b = p.put("b.png", &whole(2, |_, _| 0.5));
     let file = p.path("report.json");
-    let flags = ["--max-flip", "1", "--report", file.to_str().expect("a name")];
+    let flags = [
+        "--max-flip",
+        "1",
+        "--report",
+        file.to_str().expect("a name"),
+    ];
     run(&a, &b, &flags).code(0);
     let text = std::fs::read(&file).expect("a report");
     let json: serde_json::Value = serde_json::from_slice(&text).expect("JSON");

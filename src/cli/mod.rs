@@ -17,6 +17,7 @@ mod plan;
 mod progress;
 mod regress;
 mod render;
+mod review;
 mod saver;
 mod schema;
 mod selftest;

@@ -293,10 +293,16 @@ fn progress_for_programs_is_json() {
         .map(|l| serde_json::from_str(l).expect("JSON"))
         .collect();
     assert!((2..=4).contains(&lines.len()), "{said}");
-    let fractions: Vec<f64> = lines.iter().filter_map(|l| l["fraction"].as_f64()).collect();
+    let fractions: Vec<f64> = lines
+        .iter()
+        .filter_map(|l| l["fraction"].as_f64())
+        .collect();
     assert!(fractions.len() > 1 && fractions.is_sorted(), "{said}");
     assert!(fractions.iter().all(|f| (0.0..1.0).contains(f)), "{said}");
-    assert!(lines.iter().all(|l| l["samples"].as_f64() > Some(0.0)), "{said}");
+    assert!(
+        lines.iter().all(|l| l["samples"].as_f64() > Some(0.0)),
+        "{said}"
+    );
 }
 
 /// On a terminal, long stages are shown until they end. They are not shown elsewhere, or without a progress bar.

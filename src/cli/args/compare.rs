@@ -53,10 +53,13 @@ Each scene DIR/NAME.toml is rendered with the settings and sample count of its g
 a different seed. The two are compared as by `etendue compare`. A scene that differs leaves golden/NAME.actual.npz and \
 golden/NAME.report.html.
 
---bless leaves goldens alone that still pass, unless --size, --power or --max-spp asks for others.
+--bless leaves goldens alone that still pass, unless --size, --power or --max-spp asks for others. --review and --accept change only goldens of scenes that fail, are new, or were changed.
 
 Examples:
   etendue regress scenes --bless
+  etendue regress scenes --review
+  etendue regress scenes --accept downloaded
+      the films of a failed run in CI become the goldens
   etendue regress scenes --junit results.xml --html results.html
   etendue regress scenes --filter glass
 
@@ -67,8 +70,14 @@ pub struct RegressArgs {
     /// Folder with the scenes
     pub dir: PathBuf,
     /// Create the goldens, and re-create those that no longer pass
-    #[arg(long)]
+    #[arg(long, group = "making")]
     pub bless: bool,
+    /// Show what changed, old beside new, and ask before each golden is created or re-created
+    #[arg(long, group = "making")]
+    pub review: bool,
+    /// Make goldens of the films NAME.actual.npz that a failed run left in the folder RESULTS or below it, without rendering
+    #[arg(long, value_name = "RESULTS", conflicts_with_all = ["making", "junit", "html", "summary"])]
+    pub accept: Option<PathBuf>,
     /// Run only scenes whose name contains TEXT
     #[arg(long, value_name = "TEXT")]
     pub filter: Option<String>,
@@ -89,18 +98,21 @@ pub struct RegressArgs {
     /// Write an HTML page with all results
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Write the results as Markdown, such as to $GITHUB_STEP_SUMMARY
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
 
     /// Smallest change of the whole picture's brightness to detect with 95 % probability. Sets the number of samples [default: 1%]
     #[arg(long, value_name = "X", value_parser = values::change, allow_hyphen_values = true,
-          requires = "bless", help_heading = "With --bless")]
+          requires = "making", help_heading = "With --bless or --review")]
     pub power: Option<f64>,
     /// Most samples per pixel. At least 2 strata² are taken, so that the error can be estimated [default: 4096]
     #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true,
-          requires = "bless", help_heading = "With --bless")]
+          requires = "making", help_heading = "With --bless or --review")]
     pub max_spp: Option<u64>,
     /// Width and height in pixels [default: the scene's, scaled to 64 wide]
-    #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, requires = "bless",
-          help_heading = "With --bless")]
+    #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, requires = "making",
+          help_heading = "With --bless or --review")]
     pub size: Option<[u32; 2]>,
 
     /// What to render on: gpu is any adapter, cpu the f64 reference, auto the best available
