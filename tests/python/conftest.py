@@ -1,6 +1,5 @@
 """What the tests of the Python package share. They run against the installed package, or python/ on the path."""
 
-import os
 import pathlib
 
 import pytest
@@ -9,8 +8,7 @@ import etendue
 
 pytest_plugins = ["pytester"]
 
-# scripts/package runs copies of the tests elsewhere.
-ROOT = pathlib.Path(os.environ.get("ETENDUE_ROOT") or pathlib.Path(__file__).resolve().parents[2])
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
