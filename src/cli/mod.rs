@@ -8,6 +8,7 @@ mod compare;
 mod develop;
 mod drivers;
 mod ending;
+mod export;
 mod failure;
 mod files;
 mod info;
@@ -68,6 +69,7 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::compare(&args),
         Command::Regress(args) => regress::regress(&args),
         Command::MakeScene(args) => make_scene::make_scene(&args),
+        Command::Export(args) => export::export(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Adapters => adapters::adapters(),
         Command::Schema => schema::schema(),

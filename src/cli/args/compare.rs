@@ -11,19 +11,29 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Pictures with error layers (films, and EXR files written by etendue) need no threshold: the test compares them up to their \
 noise, and --alpha is its false-alarm rate. Other pictures need a limit (--max-flip or --max-relative-rmse); noise then \
-counts as a difference.
+counts as a difference. Several independent renders of each side state their noise by their spread.
 
 Examples:
   etendue compare before.exr after.exr
   etendue compare before.exr after.npz --html report.html
   etendue compare before.png after.png --max-flip 0.05
+  etendue compare --a old1.exr old2.exr old3.exr old4.exr --b new1.exr new2.exr new3.exr new4.exr
+      four renders of each side, with four seeds, by any program
 
 Exit status: 0 equal, 1 different, 2 not comparable, 4 a file can't be read or written.")]
 pub struct CompareArgs {
     /// Reference picture: .exr, .png, or .npz (a film)
-    pub a: PathBuf,
+    #[arg(required_unless_present = "renders_a", conflicts_with_all = ["renders_a", "renders_b"])]
+    pub a: Option<PathBuf>,
     /// Picture to compare with it
-    pub b: PathBuf,
+    #[arg(required_unless_present = "renders_a")]
+    pub b: Option<PathBuf>,
+    /// Independent renders of the reference, by any program: their spread is its noise
+    #[arg(long = "a", id = "renders_a", value_name = "FILE", num_args = 1.., requires = "renders_b")]
+    pub renders_a: Vec<PathBuf>,
+    /// Independent renders to compare with it
+    #[arg(long = "b", id = "renders_b", value_name = "FILE", num_args = 1.., requires = "renders_a")]
+    pub renders_b: Vec<PathBuf>,
     /// Probability that two pictures of the same scene are reported as different
     #[arg(long, value_name = "P", default_value_t = DEFAULT_ALPHA, value_parser = values::probability,
           allow_hyphen_values = true)]
