@@ -202,7 +202,7 @@ fn read_pbrt(text: &str) -> BTreeMap<String, usize> {
                 at += 18;
             }
             "NamedMaterial" => {
-                assert!(materials.contains(&string()), "a material that is not made")
+                assert!(materials.contains(&string()), "a material that is not made");
             }
             "MakeNamedMaterial" => {
                 assert!(materials.insert(string()), "a material made twice");

@@ -24,6 +24,7 @@ def render(
     adaptive: bool = False,
     light: str | typing.Iterable[str] | None = None,
     integrator: str | None = None,
+    light_paths: str | None = None,
     shadow_rays: int | None = None,
     max_depth: int | None = None,
     strata: int | None = None,
@@ -48,6 +49,7 @@ def render(
         adaptive: put samples where the noise is.
         light: the light to keep: "emitted", "direct", "indirect", or several of them.
         integrator: "path" or "whitted".
+        light_paths: "off" traces nothing from the lamps.
         shadow_rays, max_depth, strata, seed: as the flags of these names.
         backend: "gpu" is any adapter, "cpu" the f64 reference, "auto" the best there is.
         adapter: the adapter whose name contains this.
@@ -68,6 +70,7 @@ def render(
         "size": size and "x".join(map(str, size)),
         "light": light if light is None or isinstance(light, str) else ",".join(light),
         "integrator": integrator,
+        "light-paths": light_paths,
         "shadow-rays": shadow_rays,
         "max-depth": max_depth,
         "strata": strata,
