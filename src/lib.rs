@@ -99,3 +99,6 @@ pub mod plot;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod watch;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod export;

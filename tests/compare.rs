@@ -136,6 +136,130 @@ fn a_film_and_its_picture_say_the_same() {
 }
 
 #[test]
+fn a_report_has_the_verdict_for_scripts() {
+    let p = Pictures::new();
+    let a = p.put("a.exr", &whole(1, |_, _| 1.0));
+    let c = p.put("c.exr", &whole(3, patch));
+    let output = run(&a, &c, &["--report", "-"])
+        .code(1)
+        .stderr(contains("different in "));
+    let json: serde_json::Value =
+        serde_json::from_slice(&output.get_output().stdout).expect("JSON and nothing else");
+    assert_eq!(
+        (&json["same"], &json["identical"]),
+        (&false.into(), &false.into())
+    );
+    assert!(
+        json["sentence"]
+            .as_str()
+            .is_some_and(|s| s.starts_with("different in "))
+    );
+    let finding = &json["verdict"]["findings"][0];
+    assert!(finding["rect"]["x0"].as_u64().is_some_and(|x| x >= 16) && finding["whole"] == false);
+    let [before, after] = [0, 1].map(|k| finding["means"][k].as_f64().expect("a number"));
+    assert!(after > before && finding["p"].as_f64() < json["verdict"]["alpha"].as_f64());
+    assert!(json["metrics"]["relative_rmse"].as_f64() > Some(0.0) && json["notes"].is_array());
+    // Without errors there is no verdict.
+    let b = p.put("b.png", &whole(2, |_, _| 0.5));
+    let file = p.path("report.json");
+    let flags = [
+        "--max-flip",
+        "1",
+        "--report",
+        file.to_str().expect("a name"),
+    ];
+    run(&a, &b, &flags).code(0);
+    let text = std::fs::read(&file).expect("a report");
+    let json: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+    assert!(json["verdict"].is_null() && json["same"] == true);
+    run(&a, &b, &["--report", a.to_str().expect("a name")])
+        .code(2)
+        .stderr(contains("would overwrite"));
+}
+
+/// EXR files of another program, which states no noise: four renders of each side.
+#[test]
+fn renders_of_any_program_state_their_noise_by_their_spread() {
+    let p = Pictures::new();
+    let put = |name: &str, seed: u64, light: &dyn Fn(u32, u32) -> f64| {
+        let path = p.path(name);
+        let film = whole(seed, light);
+        write_exr(&path, &film, &described(&film), ExrChannels::Rgb).expect("written");
+        path
+    };
+    let side = |name: &str, seed: u64, light: &dyn Fn(u32, u32) -> f64| -> Vec<PathBuf> {
+        (0..4)
+            .map(|k| put(&format!("{name}{k}.exr"), seed + k, light))
+            .collect()
+    };
+    let compare = |a: &[PathBuf], b: &[PathBuf], more: &[&str]| {
+        let mut command = etendue();
+        command.arg("compare").args(more);
+        command.arg("--a").args(a).arg("--b").args(b).assert()
+    };
+    let (a, b, c) = (
+        side("a", 10, &|_, _| 1.0),
+        side("b", 20, &|_, _| 1.0),
+        side("c", 30, &patch),
+    );
+    compare(&a, &b, &[])
+        .code(0)
+        .stdout(contains("equal up to noise"));
+    compare(&a, &c, &[])
+        .code(1)
+        .stdout(contains("pixels at (16, 8)"));
+    // A film of ours against renders of another program: what a sample is differs.
+    let ours = p.put("ours.npz", &whole(1, |_, _| 1.0));
+    let brighter = p.put("brighter.npz", &whole(1, patch));
+    compare(std::slice::from_ref(&ours), &b, &[]).code(0);
+    compare(&[brighter], &b, &[])
+        .code(1)
+        .stdout(contains("pixels at (16, 8)"));
+    // The mean and its error, of one pixel by hand.
+    let read = |path: &PathBuf| f64::from(read_exr(path).expect("a picture").rgb[5][0]);
+    let values: Vec<f64> = a.iter().map(read).collect();
+    let mean = values.iter().sum::<f64>() / 4.0;
+    let squares = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    let picture = etendue::compare::Picture::read_renders(&a).expect("a picture");
+    let error = picture.noise.as_ref().expect("its noise").error[5][0];
+    assert!(
+        (picture.rgb[5][0] - mean).abs() < 1e-12 && (error - (squares / 12.0).sqrt()).abs() < 1e-12
+    );
+    // Renders that are not independent, or do not fit.
+    compare(&a, &[b[0].clone(), a[2].clone()], &[])
+        .code(2)
+        .stderr(contains("a2.exr is a render of both sides"));
+    std::fs::copy(&b[0], &b[1]).expect("copied");
+    compare(&a, &b, &[])
+        .code(2)
+        .stderr(contains("b1.exr: every pixel is that of ").and(contains("must be independent")));
+    let small = p.put(
+        "small.exr",
+        &noisy([4, 4], Rect::whole([4, 4]), 1, |_, _| 1.0),
+    );
+    compare(&a, &[b[0].clone(), small], &[])
+        .code(2)
+        .stderr(contains("small.exr: it has 4 x 4 pixels, but ").and(contains(" has 40 x 32")));
+    // One render says nothing of its noise.
+    compare(&a, &b[2..3], &[])
+        .code(2)
+        .stderr(contains("does not state its noise"));
+    etendue()
+        .arg("compare")
+        .arg("--a")
+        .args(&a)
+        .assert()
+        .code(2)
+        .stderr(contains("--b"));
+    etendue()
+        .arg("compare")
+        .arg(&a[0])
+        .assert()
+        .code(2)
+        .stderr(contains("<B>"));
+}
+
+#[test]
 fn pictures_without_noise_need_limits() {
     let p = Pictures::new();
     let a = p.put("a.exr", &whole(1, |_, _| 0.5));

@@ -264,6 +264,49 @@ fn rows_of_spheres_and_lights_stand_for_tables() {
     }
 }
 
+#[test]
+fn rows_with_colors_stand_for_materials_and_cylinders() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    };
+    write(
+        "atoms.csv",
+        "r,g,b,x,y,z,radius\n0.5,0.25,1,0,0,0,1\n0.5,0.25,1,3,0,0,1\n",
+    );
+    write(
+        "bonds.csv",
+        "x1,y1,z1,x2,y2,z2,radius,r,g,b\n0,0,0,3,0,0,0.1,-0,1,0\n",
+    );
+    let (head, tail) = SMALL.split_at(SMALL.find("[[sphere]]").expect("a sphere"));
+    let light = &tail[tail.find("[[light]]").expect("a light")..];
+    let text = format!(
+        "{head}[[spheres]]\nfile = 'atoms.csv'\n[[cylinders]]\nfile = 'bonds.csv'\n{light}"
+    );
+    let place = folder.path().join("x.toml");
+    let rows = parse_str(&place, &text).expect("a scene");
+    assert!(valid(&schema(), &to_json(&text)));
+    let tables = format!(
+        "{head}[material.a]\ntype = 'diffuse'\nreflectance = [0.5, 0.25, 1]\n\
+         [material.b]\ntype = 'diffuse'\nreflectance = [0, 1, 0]\n\
+         [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'a'\n\
+         [[sphere]]\ncenter = [3, 0, 0]\nradius = 1\nmaterial = 'a'\n\
+         [[cylinder]]\nbase = [0, 0, 0]\ntop = [3, 0, 0]\nradius = 0.1\nmaterial = 'b'\n{light}"
+    );
+    let tables = parse_str(&place, &tables).expect("a scene");
+    let hash = |s| scene_hash(s, &Settings::resolve(s, &Overrides::default()));
+    assert_eq!(hash(&rows), hash(&tables));
+    assert_eq!(rows.row_files.len(), 2);
+    // A colour beside a material is none too many or none too few.
+    let both = text.replace("'atoms.csv'\n", "'atoms.csv'\nmaterial = 'white'\n");
+    let errors = parse_str(&place, &both).expect_err("both");
+    assert!(
+        errors[0].to_string().contains("unknown column \"r\""),
+        "{}",
+        errors[0]
+    );
+}
+
 /// Defaults satisfy their own rules, and every key has a text to show.
 #[test]
 fn the_schema_is_complete_for_editors() {

@@ -154,6 +154,7 @@ mod tests {
             noise: error.map(|e| Noise {
                 error: vec![[e; 4]; n],
                 samples: vec![8; n],
+                unit: crate::compare::Unit::Sample,
                 replicates: 4,
             }),
             origin: Vec::new(),

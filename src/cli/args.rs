@@ -57,6 +57,8 @@ pub enum Command {
     Regress(RegressArgs),
     /// Generate a scene with many spheres or many lights
     MakeScene(MakeSceneArgs),
+    /// Write a scene for another renderer: Mitsuba 3 or pbrt-v4
+    Export(ExportArgs),
     /// Measure error against rendering time
     Bench(Box<BenchArgs>),
     /// Serve a page on which films grow that other processes write
@@ -163,6 +165,44 @@ pub struct MakeSceneArgs {
     /// Print only errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `etendue export`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  etendue export scene.toml --to mitsuba -o scene.xml
+  etendue export scene.toml --to pbrt -o scene.pbrt --spp 1024
+
+What the other renderer has no equal for becomes what comes nearest, and a warning says what differs. Planes end where nothing of \
+them is seen.")]
+pub struct ExportArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// The renderer
+    #[arg(long, value_enum, value_name = "RENDERER")]
+    pub to: ExportTarget,
+    /// File to write. With - it goes to stdout
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Samples per pixel
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = values::whole::<u64>(1, 1 << 31), allow_hyphen_values = true)]
+    pub spp: u64,
+    /// Width and height in pixels [default: the scene's]
+    #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true)]
+    pub size: Option<[u32; 2]>,
+    /// Print only warnings and errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `--to` of `etendue export`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportTarget {
+    /// Mitsuba 3, for its RGB variants.
+    Mitsuba,
+    /// pbrt-v4.
+    Pbrt,
 }
 
 /// What `etendue make-scene` makes.

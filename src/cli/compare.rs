@@ -2,13 +2,13 @@
 
 use super::args::CompareArgs;
 use super::failure::Failure;
-use super::files::Files;
+use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::{say, write_stdout};
 use crate::compare::{LABELS, Limits, Picture, compare as compare_pictures, html};
 use crate::files::atomic;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Read one picture, read the other, compare them.
 const STEPS: usize = 3;
@@ -16,18 +16,23 @@ const STEPS: usize = 3;
 /// Prints the comparison. The exit status is 1 if the pictures differ.
 pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let mut files = Files::default();
-    files.reads("a picture to compare", &args.a)?;
-    files.reads("a picture to compare", &args.b)?;
+    let sides = sides(args);
+    for path in sides.iter().flatten() {
+        files.reads("a picture to compare", path)?;
+    }
     if let Some(path) = &args.html {
         files.writes("--html", path)?;
     }
+    if let Some(path) = &args.report {
+        files.writes_text("--report", path)?;
+    }
     super::set_threads(args.talk.threads);
     let mut progress = Progress::new(&args.talk);
-    let mut read = |done: usize, path: &Path| {
-        progress.step(done, STEPS, &path.display().to_string());
-        Picture::read(path)
+    let mut read = |done: usize, paths: &[PathBuf]| {
+        progress.step(done, STEPS, &paths[0].display().to_string());
+        Picture::read_renders(paths)
     };
-    let (a, b) = (read(0, &args.a)?, read(1, &args.b)?);
+    let (a, b) = (read(0, &sides[0])?, read(1, &sides[1])?);
     progress.step(2, STEPS, "comparing");
     let limits = Limits {
         alpha: args.alpha,
@@ -36,12 +41,34 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     };
     let mut comparison =
         compare_pictures(&a, &b, &limits).map_err(|e| Failure::Input(e.to_string()))?;
-    if is_same_file(&args.a, &args.b) {
-        comparison.notes = vec!["both names lead to the same file".into()];
+    match &sides {
+        [a, b] if a.len() == 1 && b.len() == 1 => {
+            if is_same_file(&a[0], &b[0]) {
+                comparison.notes = vec!["both names lead to the same file".into()];
+            }
+        }
+        // Noise that both share is no evidence.
+        [a, b] => {
+            let twice = |p: &&PathBuf| b.iter().any(|q| is_same_file(p, q));
+            if let Some(path) = a.iter().find(twice) {
+                let path = path.display();
+                return Err(Failure::Input(format!(
+                    "{path} is a render of both sides; each side needs renders of its own"
+                )));
+            }
+        }
     }
     progress.finish();
     if !(args.talk.quiet && comparison.same()) {
-        write_stdout(&comparison.report())?;
+        let text = comparison.report();
+        if args.report.as_deref().is_some_and(is_stdout) {
+            say!("{}", text.trim_end());
+        } else {
+            write_stdout(&text)?;
+        }
+    }
+    if let Some(path) = &args.report {
+        write_text(path, &comparison.to_json())?;
     }
     if let Some(path) = &args.html {
         let page = html::page(&a, &b, LABELS, &comparison);
@@ -55,6 +82,17 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     } else {
         Err(Failure::Said(1))
     }
+}
+
+/// The files of both sides: one picture each, or several renders.
+fn sides(args: &CompareArgs) -> [Vec<PathBuf>; 2] {
+    let side = |one: &Option<PathBuf>, renders: &[PathBuf]| {
+        one.iter().chain(renders).cloned().collect::<Vec<_>>()
+    };
+    [
+        side(&args.a, &args.renders_a),
+        side(&args.b, &args.renders_b),
+    ]
 }
 
 /// Whether two names lead to one file.

@@ -10,6 +10,7 @@ mod develop;
 mod drivers;
 mod ending;
 mod events;
+mod export;
 mod failure;
 mod files;
 mod info;
@@ -21,6 +22,7 @@ mod plot;
 mod progress;
 mod regress;
 mod render;
+mod review;
 mod saver;
 mod schema;
 mod selftest;
@@ -67,6 +69,7 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::compare(&args),
         Command::Regress(args) => regress::regress(&args),
         Command::MakeScene(args) => make_scene::make_scene(&args),
+        Command::Export(args) => export::export(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Watch(args) => watch::watch(&args),
         Command::Plot(args) => plot::plot(&args),

@@ -1,4 +1,4 @@
-//! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere, JSON for programs.
+//! Progress on stderr: a bar on a terminal, a line every few seconds elsewhere; as events for programs.
 
 use super::args::{ProgressStyle, Talk};
 use super::events;

@@ -5,13 +5,13 @@ use super::failure::Failure;
 use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::signals::Signals;
-use super::{plan, say, write_stdout};
+use super::{plan, review, say, write_stdout};
 use crate::compare::Limits;
 use crate::engine::{DeviceInfo, Engine};
 use crate::files::{FileError, atomic};
 use crate::reference::CpuEngine;
 use crate::regress::report::{self, About, Done, Filter};
-use crate::regress::{Case, Outcome, Trouble, Wanted, almost_scenes, cases};
+use crate::regress::{Case, LABELS, Outcome, Trouble, Wanted, almost_scenes, cases, left_films};
 use crate::render::{Error, backend, memory};
 use crate::scene::parse;
 use crate::settings::Settings;
@@ -55,13 +55,20 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
         return Err(FileError::content(&args.dir, format!("{what}, so nothing to compare")).into());
     }
     check_files(args, &cases)?;
+    if let Some(results) = &args.accept {
+        return accept(args, &cases, filter.as_ref(), results);
+    }
     // Without the selected adapter every case would fail.
     let (gpu, note) = backend::open(args.backend, args.adapter.as_deref())?;
     if let Some(note) = note.filter(|_| !args.talk.quiet) {
         say!("{note}");
     }
     let device = gpu.map_or_else(CpuEngine::device_info, |gpu| gpu.info().clone());
-    let mut done = run(args, &cases, &signals);
+    let mut done = if args.review {
+        review::review(args, &cases, &signals)
+    } else {
+        run(args, &cases, &signals)
+    };
     done.sort_by(|a, b| a.case.name.cmp(&b.case.name));
     let finished = finish(args, &done, filter.as_ref(), device);
     if signals.stop.load(Ordering::Relaxed) {
@@ -75,7 +82,7 @@ pub fn regress(args: &RegressArgs) -> Result<(), Failure> {
 
 /// Refuses output files that would overwrite a scene, a golden, or each other.
 fn check_files(args: &RegressArgs, cases: &[Case]) -> Result<(), Failure> {
-    if args.html.is_none() && args.junit.is_none() {
+    if args.html.is_none() && args.junit.is_none() && args.summary.is_none() {
         return Ok(());
     }
     let mut files = Files::default();
@@ -97,6 +104,9 @@ fn check_files(args: &RegressArgs, cases: &[Case]) -> Result<(), Failure> {
     }
     if let Some(path) = &args.junit {
         files.writes_text("--junit", path)?;
+    }
+    if let Some(path) = &args.summary {
+        files.writes("--summary", path)?;
     }
     Ok(())
 }
@@ -130,19 +140,27 @@ fn run(args: &RegressArgs, cases: &[Case], signals: &Signals) -> Vec<Done> {
         .unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
+/// The engine that the flags select, for a scene.
+pub(super) fn engine(
+    args: &RegressArgs,
+    world: &World,
+    settings: &Settings,
+) -> Result<(Box<dyn Engine>, u64), Trouble> {
+    let [width, height] = settings.size.map(u64::from);
+    let adapter = args.adapter.as_deref();
+    let chosen = memory::check(width * height, true)
+        .and_then(|()| backend::choose(args.backend, adapter, world, settings, |_| ()));
+    match chosen {
+        Ok(chosen) => Ok((chosen.engine, chosen.tile_pixels)),
+        Err(Error::Device(why)) => Err(Trouble::Device(why)),
+        Err(other) => Err(Trouble::Input(other.to_string())),
+    }
+}
+
+/// Runs a case. `None` if a signal interrupted it.
+pub(super) fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
     let begun = Instant::now();
-    let engine = |world: &World, settings: &Settings| -> Result<(Box<dyn Engine>, u64), Trouble> {
-        let [width, height] = settings.size.map(u64::from);
-        let adapter = args.adapter.as_deref();
-        let chosen = memory::check(width * height, true)
-            .and_then(|()| backend::choose(args.backend, adapter, world, settings, |_| ()));
-        match chosen {
-            Ok(chosen) => Ok((chosen.engine, chosen.tile_pixels)),
-            Err(Error::Device(why)) => Err(Trouble::Device(why)),
-            Err(other) => Err(Trouble::Input(other.to_string())),
-        }
-    };
+    let engine = |world: &World, settings: &Settings| engine(args, world, settings);
     let limits = Limits {
         alpha: args.alpha,
         ..Limits::default()
@@ -155,12 +173,50 @@ fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
     Some(Done {
         case: case.clone(),
         outcome,
-        pictures,
+        pictures: LABELS
+            .into_iter()
+            .zip(pictures.into_iter().flatten())
+            .collect(),
         time: begun.elapsed(),
     })
 }
 
-fn wanted(args: &RegressArgs) -> Wanted {
+/// Makes goldens of the films that a failed run left.
+fn accept(
+    args: &RegressArgs,
+    cases: &[Case],
+    filter: Option<&Filter>,
+    results: &Path,
+) -> Result<(), Failure> {
+    let films = left_films(results)?;
+    for (name, film) in &films {
+        let known = cases.iter().any(|case| case.scene && case.name == *name);
+        if !known && filter.is_none() {
+            let (film, dir) = (film.display(), args.dir.display());
+            say!("note: {film} is ignored: {dir} has no scene of this name");
+        }
+    }
+    let mut done = Vec::new();
+    for case in cases.iter().filter(|case| case.scene) {
+        let begun = Instant::now();
+        if let Some(film) = films.get(&case.name) {
+            done.push(Done {
+                case: case.clone(),
+                outcome: case.accept(film, &wanted(args)),
+                pictures: Vec::new(),
+                time: begun.elapsed(),
+            });
+        }
+    }
+    if done.is_empty() {
+        let why = format!("no film of a scene in {}", args.dir.display());
+        return Err(FileError::content(results, why).into());
+    }
+    tell(args, &done, filter)?;
+    verdict(&done)
+}
+
+pub(super) fn wanted(args: &RegressArgs) -> Wanted {
     Wanted {
         size: args.size,
         power: args.power,
@@ -179,27 +235,28 @@ fn finish(
         device,
         time: SystemTime::now(),
     };
-    let mut list = String::new();
-    for d in done
-        .iter()
-        .filter(|d| !(args.talk.quiet && d.outcome.good()))
-    {
-        let detail = d.outcome.detail(&d.case);
-        list += &format!("{:>9}  {}: {detail}\n", d.outcome.word(), d.case.name);
-        if let Outcome::Failed {
-            comparison,
-            unsaved,
-        } = &d.outcome
-        {
-            for line in comparison.findings_text().lines() {
-                list += &format!("          {line}\n");
-            }
-            list += &format!(
-                "          {}\n",
-                report::advice(&d.case, unsaved.as_deref())
-            );
-        }
+    tell(args, done, filter)?;
+    if let Some(path) = &args.junit {
+        write_text(path, &report::junit(done, &about))?;
     }
+    if let Some(path) = &args.html {
+        let base = path.parent().unwrap_or(Path::new(""));
+        let page = report::index(done, filter, &about, base);
+        atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
+    }
+    if let Some(path) = &args.summary {
+        let text = report::markdown(done, filter, &about);
+        atomic::replace(path, |f| f.write_all(text.as_bytes()))?;
+    }
+    verdict(done)
+}
+
+/// Prints the results: on stdout, unless JUnit XML goes there.
+fn tell(args: &RegressArgs, done: &[Done], filter: Option<&Filter>) -> Result<(), Failure> {
+    let told = done
+        .iter()
+        .filter(|d| !(args.talk.quiet && d.outcome.good()));
+    let mut list: String = told.map(lines).collect();
     if !args.talk.quiet || !list.is_empty() {
         list += &format!("{}\n", report::summary(done, filter));
     }
@@ -217,14 +274,29 @@ fn finish(
             say!("warning: {}: {warning}", d.case.name);
         }
     }
-    if let Some(path) = &args.junit {
-        write_text(path, &report::junit(done, &about))?;
+    Ok(())
+}
+
+/// A case in the list, with where it differs.
+pub(super) fn lines(d: &Done) -> String {
+    let detail = d.outcome.detail(&d.case);
+    let mut lines = format!("{:>9}  {}: {detail}\n", d.outcome.word(), d.case.name);
+    if let Outcome::Failed {
+        comparison,
+        unsaved,
+    } = &d.outcome
+    {
+        for line in comparison.findings_text().lines() {
+            lines += &format!("          {line}\n");
+        }
+        let advice = report::advice(&d.case, unsaved.as_deref());
+        lines += &format!("          {advice}\n");
     }
-    if let Some(path) = &args.html {
-        let base = path.parent().unwrap_or(Path::new(""));
-        let page = report::index(done, filter, &about, base);
-        atomic::replace(path, |f| f.write_all(page.as_bytes()))?;
-    }
+    lines
+}
+
+/// The exit status for the results.
+fn verdict(done: &[Done]) -> Result<(), Failure> {
     let any = |what: fn(&Outcome) -> bool| done.iter().any(|d| what(&d.outcome));
     if any(|o| matches!(o, Outcome::NoDevice(_))) {
         Err(Failure::Said(3))

@@ -55,7 +55,7 @@ impl Terms {
             let (mut va, mut vb) = (na.error[i][channel].powi(2), nb.error[i][channel].powi(2));
             // Samples of both pictures have the same variance if both were rendered alike. The picture with more samples
             // estimates it better: rare bright samples may be missing from the other.
-            if va * n / m + vb * m / n > va + vb {
+            if na.unit == nb.unit && va * n / m + vb * m / n > va + vb {
                 (va, vb) = (va * n / m, vb * m / n);
             }
             terms.variance[i] = va + vb;

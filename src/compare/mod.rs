@@ -8,11 +8,13 @@ mod grid;
 pub mod html;
 pub mod metrics;
 mod picture;
+mod renders;
+mod report;
 mod text;
 pub mod verdict;
 
 pub use metrics::Metrics;
-pub use picture::{Noise, Picture};
+pub use picture::{Noise, Picture, Unit};
 pub use verdict::Verdict;
 
 /// The rate of false alarms over the whole picture, unless another is asked for.

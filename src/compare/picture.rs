@@ -29,10 +29,21 @@ pub struct Picture {
 pub struct Noise {
     /// Standard errors of R, G, B and of the luminance, row by row.
     pub error: Vec<[f64; 4]>,
-    /// Samples of each pixel.
+    /// How often each pixel was measured.
     pub samples: Vec<u64>,
+    /// What `samples` counts.
+    pub unit: Unit,
     /// Independent replicates behind every error, at least 2.
     pub replicates: u32,
+}
+
+/// A measurement of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unit {
+    /// A sample of this program's, or of another program that states its variance.
+    Sample,
+    /// A whole picture; nobody knows of how many samples.
+    Render,
 }
 
 impl Picture {
@@ -80,6 +91,7 @@ impl Picture {
             noise: (provenance.replicates >= 2).then(|| Noise {
                 error: estimates.iter().map(|e| e.error).collect(),
                 samples: estimates.iter().map(|e| e.samples).collect(),
+                unit: Unit::Sample,
                 replicates: provenance.replicates,
             }),
             origin: entries(&provenance)
@@ -109,6 +121,7 @@ impl Picture {
             (Some(error), Some(samples)) if replicates >= 2 => Some(Noise {
                 error: error.iter().map(|e| e.map(f64::from)).collect(),
                 samples: samples.into_iter().map(u64::from).collect(),
+                unit: Unit::Sample,
                 replicates,
             }),
             _ => None,
@@ -139,7 +152,7 @@ impl Picture {
             .map_err(|why| FileError::content(path, why))
     }
 
-    fn not_empty(self) -> Result<Self, String> {
+    pub(super) fn not_empty(self) -> Result<Self, String> {
         if self.covered.contains(&true) {
             Ok(self)
         } else {

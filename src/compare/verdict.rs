@@ -24,6 +24,7 @@
 use super::grid::{Grid, Terms};
 use super::picture::Picture;
 use crate::film::coverage::Rect;
+use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use statrs::function::erf::{erfc, erfc_inv};
 use std::f64::consts::SQRT_2;
@@ -41,7 +42,8 @@ pub(super) const ROUNDING: f64 = 2e-6;
 const MOST_FINDINGS: usize = 8;
 
 /// What a test is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// Welch's t of a small block.
     Small,
@@ -52,7 +54,7 @@ pub enum Kind {
 }
 
 /// A block that differs.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
     /// Its pixels.
     pub rect: Rect,
@@ -73,7 +75,7 @@ pub struct Finding {
 }
 
 /// The smallest change that the tests detect with probability [`POWER`].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Sensitivity {
     /// Side of the block; 0 for the whole picture.
     pub side: u32,
@@ -88,7 +90,7 @@ pub const POWER: f64 = 0.95;
 const POWER_QUANTILE: f64 = 1.644_854;
 
 /// The result of the tests.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
     /// The false-alarm rate over the whole picture.
     pub alpha: f64,

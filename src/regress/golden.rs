@@ -1,32 +1,21 @@
 //! Golden pictures: rendered with just enough samples, and read back with their settings.
 
-use super::{Case, MakeEngine, Trouble, render, text};
 use crate::compare::{Picture, verdict::verdict};
 use crate::files::FileError;
 use crate::film::Film;
-use crate::film::REPLICATES;
-use crate::film::coverage::Rect;
 use crate::output::{ExrChannels, write_exr};
 use crate::provenance::{Provenance, integrator_name, light_name};
-use crate::scene::{Scene, parse};
+use crate::scene::Scene;
 use crate::settings::{Integrator, LightParts, Overrides, Settings};
-use crate::world::World;
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
-use std::sync::atomic::AtomicBool;
-
-/// Goldens are this wide unless a size is asked for.
-const WIDTH: u32 = 64;
-
-/// Samples at which the noise is looked at first.
-const FIRST_LOOK: u64 = 64;
 
 /// The change of brightness that comparisons with goldens detect, unless another is asked for.
 const POWER: f64 = 0.01;
 
 /// Most samples per pixel of a golden, unless another number is asked for.
-const MOST_SAMPLES: u64 = 4096;
+pub(super) const MOST_SAMPLES: u64 = 4096;
 
 /// How to make goldens.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,7 +31,7 @@ pub struct Wanted {
 }
 
 impl Wanted {
-    fn power(&self) -> f64 {
+    pub(super) fn power(&self) -> f64 {
         self.power.unwrap_or(POWER)
     }
 
@@ -109,78 +98,6 @@ impl Bless {
     }
 }
 
-/// Renders the case's scene with just enough samples, and writes it as the golden. `None` if `stop` was set.
-pub(super) fn bless(
-    case: &Case,
-    engine: &MakeEngine,
-    wanted: &Wanted,
-    stop: &AtomicBool,
-) -> Result<Option<Bless>, Trouble> {
-    let path = case.scene_path();
-    let source = parse::read_text(&path).map_err(text)?;
-    let scene =
-        parse::parse_str(&path, &source).map_err(|e| parse::ReadError::Invalid(e).to_string())?;
-    let [w, h] = scene.camera.resolution;
-    let small = |w: u32, h: u32| {
-        let height = (f64::from(WIDTH) * f64::from(h) / f64::from(w)).round();
-        [WIDTH, (height as u32).max(1)]
-    };
-    let size = wanted
-        .size
-        .unwrap_or(if w > WIDTH { small(w, h) } else { [w, h] });
-    let overrides = Overrides {
-        size: Some(size),
-        ..Overrides::default()
-    };
-    let settings = Settings::resolve(&scene, &overrides);
-    let mut provenance = Provenance::new(&scene, source, &settings);
-    let (step, most) = steps(
-        settings.round(),
-        wanted.most_samples.unwrap_or(MOST_SAMPLES),
-    )?;
-    let (mut engine, tile) = engine(&World::new(&scene, size), &settings)?;
-    let mut film = Film::new(size, Rect::whole(size), settings.strata);
-    let whole_rounds = |n: f64| ((n as u64).div_ceil(step) * step).min(most);
-    let mut samples = whole_rounds(FIRST_LOOK as f64);
-    let power = loop {
-        if !render(
-            engine.as_mut(),
-            tile,
-            &mut film,
-            &mut provenance,
-            samples,
-            stop,
-        )? {
-            return Ok(None);
-        }
-        let picture = Picture::from_film(path.display().to_string(), &film, &provenance)?;
-        let power = smallest_change(&picture, wanted.alpha);
-        if power <= wanted.power() || samples >= most {
-            break power;
-        }
-        // Noise falls with the square root of the samples; a first look may be far off.
-        let factor = (1.05 * (power / wanted.power()).powi(2)).clamp(1.1, 8.0);
-        samples = whole_rounds(samples as f64 * factor);
-    };
-    if power >= NO_EVIDENCE && !provenance.black {
-        return Err(no_evidence(&path.display().to_string(), "raise --max-spp").into());
-    }
-    let golden = case.golden_path();
-    let folder = case.dir.join("golden");
-    std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    write(&golden, &film, &provenance).map_err(text)?;
-    case.clear();
-    let bytes = std::fs::metadata(&golden).map_err(|e| format!("{}: {e}", golden.display()))?;
-    Ok(Some(Bless {
-        size,
-        samples,
-        power,
-        short: power > wanted.power(),
-        bytes: bytes.len(),
-        replaced: None,
-    }))
-}
-
 /// Writes a golden. The time that it took is left out, so that the same picture is the same file.
 pub(super) fn write(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), FileError> {
     let untimed = Provenance {
@@ -192,15 +109,15 @@ pub(super) fn write(path: &Path, film: &Film, provenance: &Provenance) -> Result
 
 /// A golden is no evidence if comparisons with it do not detect a change of the whole picture's brightness by so much: it holds
 /// next to no light beside its noise.
-const NO_EVIDENCE: f64 = 1.0;
+pub(super) const NO_EVIDENCE: f64 = 1.0;
 
 /// The smallest change of the whole picture's brightness that a comparison with a similar picture detects.
-fn smallest_change(picture: &Picture, alpha: f64) -> f64 {
+pub(super) fn smallest_change(picture: &Picture, alpha: f64) -> f64 {
     let seen = verdict(picture, picture, alpha).sensitivity;
     seen.first().map_or(f64::INFINITY, |s| s.change)
 }
 
-fn no_evidence(name: &str, remedy: &str) -> String {
+pub(super) fn no_evidence(name: &str, remedy: &str) -> String {
     format!(
         "{name}: the picture holds next to no light beside its noise: a golden of it is no evidence, since even a doubling of its \
          brightness would pass; {remedy}"
@@ -216,21 +133,6 @@ pub(super) fn check_evidence(golden: &Picture, alpha: f64, black: bool) -> Resul
         &golden.name,
         "re-create it with --bless and a higher --max-spp",
     ))
-}
-
-/// The unit of a golden's samples, and the most of them that there may be: whole rounds of all replicates, or of some where
-/// `most` samples are fewer. Their error takes two.
-fn steps(round: u64, most: u64) -> Result<(u64, u64), String> {
-    let period = round * REPLICATES as u64;
-    let step = if most >= period { period } else { round };
-    let most = most / step * step;
-    if most < 2 * round {
-        return Err(format!(
-            "--max-spp is too low: to estimate its error, a golden of this scene needs at least {} samples per pixel",
-            2 * round
-        ));
-    }
-    Ok((step, most))
 }
 
 /// The settings in a golden's header, with which it can be rendered again.
@@ -290,15 +192,15 @@ impl Facts {
         })
     }
 
-    /// Refuses a golden of paths of another length than the scene's: its light differs. Size, strata and seed do not change the light,
-    /// and are the golden's.
-    pub fn check_settings(&self, scene: &Scene, hint: &str) -> Result<(), String> {
+    /// Refuses a picture of paths of another length than the scene's: its light differs. Size, strata and seed do not change the light,
+    /// and are the picture's. `what` names it, and `remedy` is what to do.
+    pub fn check_settings(&self, scene: &Scene, what: &str, remedy: &str) -> Result<(), String> {
         let now = Settings::resolve(scene, &Overrides::default()).max_depth;
         if now == self.max_depth {
             return Ok(());
         }
         Err(format!(
-            "the golden has max_depth {}, but the scene has {now}; if the change is intended, re-create the golden with {hint}",
+            "{what} has max_depth {}, but the scene has {now}; {remedy}",
             self.max_depth
         ))
     }
@@ -321,18 +223,4 @@ impl Facts {
 
 fn number<T: FromStr>(golden: &Picture, key: &str) -> Option<T> {
     golden.origin(key)?.parse().ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn goldens_respect_max_spp() {
-        assert_eq!(steps(4, 4096), Ok((16, 4096)));
-        assert_eq!(steps(4, 100), Ok((16, 96)));
-        assert_eq!(steps(4, 15), Ok((4, 12)));
-        assert_eq!(steps(4, 8), Ok((4, 8)));
-        assert!(steps(4, 7).is_err_and(|e| e.contains("needs at least 8 samples per pixel")));
-    }
 }

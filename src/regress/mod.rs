@@ -6,11 +6,15 @@
 //! `NAME.report.html` beside the golden.
 
 mod assertion;
+mod candidate;
 mod golden;
 #[doc(hidden)]
 pub mod report;
+mod summary;
 
 pub use assertion::{BLESS, assert_golden};
+#[doc(hidden)]
+pub use candidate::{Candidate, left_films};
 #[doc(hidden)]
 pub use golden::{Bless, Wanted};
 
@@ -60,7 +64,8 @@ impl From<Trouble> for Outcome {
 }
 
 /// What pages call the two pictures.
-const LABELS: [&str; 2] = ["golden", "now"];
+#[doc(hidden)]
+pub const LABELS: [&str; 2] = ["golden", "now"];
 
 /// A scene's picture beside its golden.
 struct Judged {
@@ -167,7 +172,7 @@ impl Case {
 
     /// The film that a failure leaves.
     pub fn actual_path(&self) -> PathBuf {
-        self.beside("actual.npz")
+        self.beside(candidate::ACTUAL)
     }
 
     /// The page that a failure leaves.
@@ -252,16 +257,25 @@ impl Case {
                 Err(trouble) => return Some((trouble.into(), None)),
             },
         };
-        match golden::bless(self, engine, wanted, stop) {
-            Ok(blessed) => {
-                let blessed = Bless {
-                    replaced,
-                    ..blessed?
-                };
-                Some((Outcome::Blessed(blessed), None))
-            }
-            Err(trouble) => Some((trouble.into(), None)),
-        }
+        let made = match Candidate::render(self, engine, wanted, stop) {
+            Ok(made) => made?.put(self, wanted),
+            Err(trouble) => Err(trouble),
+        };
+        let outcome = match made {
+            Ok(blessed) => Outcome::Blessed(Bless {
+                replaced,
+                ..blessed
+            }),
+            Err(trouble) => trouble.into(),
+        };
+        Some((outcome, None))
+    }
+
+    /// Makes the film that a failed run left the golden, without rendering.
+    pub fn accept(&self, film: &Path, wanted: &Wanted) -> Outcome {
+        let made = Candidate::left(self, film, wanted);
+        made.and_then(|candidate| candidate.put(self, wanted))
+            .map_or_else(Outcome::from, Outcome::Blessed)
     }
 
     fn judge(
@@ -275,17 +289,18 @@ impl Case {
         let source = parse::read_text(&self.scene_path()).map_err(text)?;
         let scene = parse::parse_str(&self.scene_path(), &source)
             .map_err(|e| parse::ReadError::Invalid(e).to_string())?;
-        facts.check_settings(&scene, &self.hint())?;
+        let hint = self.hint();
+        let remedy = format!("if the change is intended, re-create the golden with {hint}");
+        facts.check_settings(&scene, "the golden", &remedy)?;
         let settings = facts.settings(&scene);
         let mut provenance = Provenance::new(&scene, source, &settings);
         if provenance.scene_hash != facts.scene_hash {
             return Err(format!(
-                "{} is of another scene than {} (hash {} and {}); if the change is intended, re-create the golden with {}",
+                "{} is of another scene than {} (hash {} and {}); {remedy}",
                 self.golden_path().display(),
                 self.scene_path().display(),
                 short(&facts.scene_hash),
-                short(&provenance.scene_hash),
-                self.hint()
+                short(&provenance.scene_hash)
             )
             .into());
         }

@@ -1,6 +1,6 @@
 //! The results of a regression run: as JUnit XML and as an HTML page.
 
-use super::{Case, LABELS, Outcome};
+use super::{Case, Outcome};
 use crate::compare::{Picture, html};
 use crate::engine::DeviceInfo;
 use std::fmt::Write as _;
@@ -16,8 +16,8 @@ pub struct Done {
     pub case: Case,
     /// Its result.
     pub outcome: Outcome,
-    /// Golden and actual picture, where there are both.
-    pub pictures: Option<[Picture; 2]>,
+    /// Golden and actual picture, those that there are, with what pages call them.
+    pub pictures: Vec<(&'static str, Picture)>,
     /// How long it took.
     pub time: Duration,
 }
@@ -178,7 +178,7 @@ pub fn index(done: &[Done], filter: Option<&Filter>, about: &About, base: &Path)
     for d in ordered {
         let class = if d.outcome.good() { "" } else { "different" };
         let name = html::escape(&d.case.name);
-        let pictures = d.pictures.iter().flatten().zip(LABELS).map(|(p, label)| {
+        let pictures = d.pictures.iter().map(|(label, p)| {
             format!(
                 "<figure><img alt=\"{name}, {label}\" src=\"{}\"><figcaption>{label}</figcaption></figure>",
                 html::picture_uri(p)
@@ -200,20 +200,29 @@ pub fn index(done: &[Done], filter: Option<&Filter>, about: &About, base: &Path)
             pictures.collect::<String>()
         );
     }
+    let values = [
+        ("summary", html::escape(&summary(done, filter))),
+        ("made", html::escape(&made(about))),
+        ("rows", rows),
+    ];
+    html::fill(TEMPLATE, &values)
+}
+
+/// What rendered, and when.
+pub(super) fn made(about: &About) -> String {
     let About { device, time } = about;
-    let made = format!(
+    format!(
         "etendue {} on {}, {}; {}",
         env!("CARGO_PKG_VERSION"),
         device.name,
         device.driver,
         utc(*time)
-    );
-    let values = [
-        ("summary", html::escape(&summary(done, filter))),
-        ("made", html::escape(&made)),
-        ("rows", rows),
-    ];
-    html::fill(TEMPLATE, &values)
+    )
+}
+
+/// The results as Markdown.
+pub fn markdown(done: &[Done], filter: Option<&Filter>, about: &About) -> String {
+    super::summary::markdown(done, filter, about)
 }
 
 /// A time to the minute: "2026-02-28 23:59 UTC".

@@ -1,6 +1,7 @@
 //! Defines what each table of a scene file contains. The parser uses these definitions to read a file, and the schema uses
 //! them to list the keys.
 
+use super::rows::RowKind;
 use super::value::{
     Angle, Count, Direction, LARGEST_STRATA, Point, Radiance, Radius, Resolution, SMALLEST, Text,
     Value, normalized,
@@ -241,15 +242,23 @@ fn cylinder(t: &mut impl Table) -> Option<Shape> {
     })
 }
 
-/// `[[spheres]]`: the file of rows, and the name of their material if they have one in common.
-pub(super) fn spheres(t: &mut impl Table) -> Option<(String, Option<String>)> {
-    let about = "CSV file whose first row names the columns: x, y, z, radius and, without the key material, \
-                 material. Its path is relative to the scene file.";
+/// `[[spheres]]` or `[[cylinders]]`: the file of rows, and the name of their material if they have one in common.
+pub(super) fn surfaces(t: &mut impl Table, kind: RowKind) -> Option<(String, Option<String>)> {
+    let about = match kind {
+        RowKind::Sphere => {
+            "CSV file whose first row names the columns: x, y, z, radius and, without the key material, material or r, g, b \
+             (the reflectance of a diffuse material). Its path is relative to the scene file."
+        }
+        RowKind::Cylinder => {
+            "CSV file whose first row names the columns: x1, y1, z1, x2, y2, z2 (centres of both caps), radius and, without the \
+             key material, material or r, g, b (the reflectance of a diffuse material). Its path is relative to the scene file."
+        }
+    };
     let file = t.required::<Text>("file", about);
     let material = t.optional::<Text>(
         "material",
         None,
-        "NAME of a [material.NAME], for all spheres of the file.",
+        "NAME of a [material.NAME], for all rows of the file.",
     );
     Some((file?.0, material.map(|m| m.0)))
 }

@@ -51,9 +51,9 @@ pub struct Scene {
     pub camera: Camera,
     /// `[render]`: what the file asks for; flags override it, [`Settings`](crate::settings::Settings) decides.
     pub render: RenderHints,
-    /// Materials in the order of their names.
+    /// Materials in the order of their names, those of colours in rows last.
     pub materials: Vec<Material>,
-    /// Primitives in the order spheres (those from files of rows last), planes, disks, cylinders, each in file order.
+    /// Primitives in the order spheres, planes, disks, cylinders, each in file order, those from files of rows after the others.
     pub primitives: Vec<Primitive>,
     /// Disk lights in file order, those from files of rows last; at least one.
     pub lights: Vec<Light>,

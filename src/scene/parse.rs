@@ -3,6 +3,7 @@
 
 use super::format::{self, ShapeKind, Table};
 use super::reader::Reader;
+use super::rows::{Palette, RowKind};
 use super::source::{Faults, Source, quoted, suggestion};
 use super::value::Text;
 use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Scene};
@@ -157,7 +158,8 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
         None => Some(RenderHints::default()),
     };
     let materials = materials(&mut file);
-    let primitives = primitives(&mut file, &materials);
+    let mut palette = Palette::new(materials.len());
+    let primitives = primitives(&mut file, &materials, &mut palette);
     let mut lights: Vec<Option<Light>> = file.each("light", |t, place| format::light(t, place));
     for more in file.each("lights", |t, place| {
         let name = format::lights(t)?;
@@ -179,7 +181,15 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
         let bsdf = bsdf?;
         Some(Material { name, bsdf, place })
     };
-    let materials: Option<Vec<Material>> = materials.into_iter().map(complete).collect();
+    let named = materials.into_iter().map(complete);
+    let colors = palette.colors.into_iter().map(|reflectance| {
+        Some(Material {
+            name: format!("rgb {} {} {}", reflectance.x, reflectance.y, reflectance.z),
+            bsdf: Bsdf::Diffuse { reflectance },
+            place: Place::default(),
+        })
+    });
+    let materials: Option<Vec<Material>> = named.chain(colors).collect();
     Some(Scene {
         path: source.path().to_owned(),
         row_files: row_files(source, root),
@@ -195,7 +205,9 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
 /// The files of rows that the scene names.
 fn row_files(source: &Source, root: &DeTable) -> Vec<PathBuf> {
     let tables = |key: &str| root.get(key).and_then(|v| v.get_ref().as_array());
-    let all = ["spheres", "lights"].into_iter().filter_map(tables);
+    let all = ["spheres", "cylinders", "lights"]
+        .into_iter()
+        .filter_map(tables);
     let names = all
         .flatten()
         .filter_map(|t| t.get_ref().as_table()?.get("file")?.get_ref().as_str());
@@ -250,7 +262,11 @@ fn source_name(name: &str) -> String {
 }
 
 /// The primitives in the order of [`Scene::primitives`].
-fn primitives(file: &mut Reader, materials: &[Named]) -> Vec<Option<Primitive>> {
+fn primitives(
+    file: &mut Reader,
+    materials: &[Named],
+    palette: &mut Palette,
+) -> Vec<Option<Primitive>> {
     let mut primitives = Vec::new();
     let misnamed = materials.is_empty() && file.table.contains_key("materials");
     for kind in ShapeKind::ALL {
@@ -283,12 +299,17 @@ fn primitives(file: &mut Reader, materials: &[Named]) -> Vec<Option<Primitive>> 
                 column: place.column,
             })
         }));
-        if kind == ShapeKind::Sphere {
-            for more in file.each("spheres", |t, place| spheres(t, place, materials)) {
-                match more {
-                    Some(more) => primitives.extend(more.into_iter().map(Some)),
-                    None => primitives.push(None),
-                }
+        let rows = match kind {
+            ShapeKind::Sphere => RowKind::Sphere,
+            ShapeKind::Cylinder => RowKind::Cylinder,
+            ShapeKind::Plane | ShapeKind::Disk => continue,
+        };
+        for more in file.each(rows.table(), |t, place| {
+            surfaces(t, place, rows, materials, palette)
+        }) {
+            match more {
+                Some(more) => primitives.extend(more.into_iter().map(Some)),
+                None => primitives.push(None),
             }
         }
     }
@@ -327,9 +348,15 @@ fn unknown_material(name: &str, materials: &[Named]) -> String {
     )
 }
 
-/// The spheres of a `[[spheres]]`.
-fn spheres(t: &mut Reader, place: Place, materials: &[Named]) -> Option<Vec<Primitive>> {
-    let (name, material) = format::spheres(t)?;
+/// The surfaces of a `[[spheres]]` or `[[cylinders]]`.
+fn surfaces(
+    t: &mut Reader,
+    place: Place,
+    kind: RowKind,
+    materials: &[Named],
+    palette: &mut Palette,
+) -> Option<Vec<Primitive>> {
+    let (name, material) = format::surfaces(t, kind)?;
     let find = |name: &str| find(name, materials);
     let common = match material.as_deref().map(find) {
         Some(Err(message)) => {
@@ -340,6 +367,6 @@ fn spheres(t: &mut Reader, place: Place, materials: &[Named]) -> Option<Vec<Prim
         None => None,
     };
     t.rows(&name, |path, text| {
-        rows::spheres(path, text, place, common, find)
+        rows::surfaces(path, text, place, kind, common, find, palette)
     })
 }

@@ -1,14 +1,15 @@
-//! Reads many spheres or lights from a CSV file: `[[spheres]]` and `[[lights]]`.
+//! Reads many spheres, cylinders or lights from a CSV file: `[[spheres]]`, `[[cylinders]]` and `[[lights]]`.
 //!
 //! The first row names the columns, in any order. Every other row is one object. Fields are numbers and names of materials,
 //! so there are no quotes.
 
 use super::source::{Source, quoted, suggestion};
-use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius};
+use super::value::{Direction, FromNumber, FromVector, Point, Radiance, Radius, SMALLEST, Share};
 use super::{Diagnostic, Light, Place, Primitive, Shape};
 use crate::files::kind::FileKind;
 use crate::files::reason;
 use glam::DVec3;
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
@@ -19,8 +20,54 @@ pub const MAX_ROWS_BYTES: u64 = 256 << 20;
 /// The most errors reported for one file.
 const MAX_ERRORS: usize = 20;
 
-/// Columns of spheres, without that of their materials.
-const SPHERE: [&str; 4] = ["x", "y", "z", "radius"];
+/// What a row of surfaces is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum RowKind {
+    Sphere,
+    Cylinder,
+}
+
+impl RowKind {
+    /// The name of the table.
+    pub(super) fn table(self) -> &'static str {
+        match self {
+            Self::Sphere => "spheres",
+            Self::Cylinder => "cylinders",
+        }
+    }
+
+    /// Its columns, without those of its material.
+    fn columns(self) -> &'static [&'static str] {
+        match self {
+            Self::Sphere => &["x", "y", "z", "radius"],
+            Self::Cylinder => &["x1", "y1", "z1", "x2", "y2", "z2", "radius"],
+        }
+    }
+
+    fn shape(self, row: Row, c: &[usize]) -> Result<Shape, (usize, String)> {
+        let point = |k: usize| row.vector::<Point>([c[k], c[k + 1], c[k + 2]]);
+        match self {
+            Self::Sphere => Ok(Shape::Sphere {
+                center: point(0)?.0,
+                radius: row.number::<Radius>(c[3])?.0,
+            }),
+            Self::Cylinder => {
+                let (base, top) = (point(0)?.0, point(3)?.0);
+                if base.distance(top) < SMALLEST {
+                    let why = format!(
+                        "x2, y2, z2 equal x1, y1, z1, but must be at least {SMALLEST:e} away from there"
+                    );
+                    return Err((c[3], why));
+                }
+                let radius = row.number::<Radius>(c[6])?.0;
+                Ok(Shape::Cylinder { base, top, radius })
+            }
+        }
+    }
+}
+
+/// Columns of a surface of its own colour: the reflectance of a diffuse material.
+const COLOR: [&str; 3] = ["r", "g", "b"];
 const MATERIAL: &str = "material";
 /// Columns of lights: centre, normal, radius, radiance.
 const LIGHT: [&str; 10] = ["x", "y", "z", "nx", "ny", "nz", "radius", "r", "g", "b"];
@@ -31,36 +78,75 @@ pub(super) enum Wrong {
     Content(Vec<Diagnostic>),
 }
 
-/// The spheres in the text of a CSV file, which the scene file names at `place`. `material` finds a material by name or returns
-/// an error. `common` is the material of all spheres if there is no such column.
-pub(super) fn spheres(
+/// The colours of rows, each of which is a diffuse material.
+pub(super) struct Palette {
+    /// Materials that there are without them.
+    pub(super) first: usize,
+    pub(super) colors: Vec<DVec3>,
+    index: HashMap<[u64; 3], usize>,
+}
+
+impl Palette {
+    pub(super) fn new(first: usize) -> Self {
+        Self {
+            first,
+            colors: Vec::new(),
+            index: HashMap::new(),
+        }
+    }
+
+    /// The number of the material of this reflectance.
+    fn material(&mut self, color: DVec3) -> usize {
+        // Adding 0 turns -0 into 0.
+        let key = color.to_array().map(|x| (x + 0.0).to_bits());
+        *self.index.entry(key).or_insert_with(|| {
+            self.colors.push(color);
+            self.first + self.colors.len() - 1
+        })
+    }
+}
+
+/// The surfaces in the text of a CSV file, which the scene file names at `place`. `material` finds a material by name or returns
+/// an error. `common` is the material of all if the file has neither such a column nor colours.
+pub(super) fn surfaces(
     path: &Path,
     text: &str,
     place: Place,
+    kind: RowKind,
     common: Option<usize>,
     material: impl Fn(&str) -> Result<usize, String>,
+    palette: &mut Palette,
 ) -> Result<Vec<Primitive>, Wrong> {
     let mut rows = Rows::new(path, text);
-    let optional: &[&str] = if common.is_some() { &[] } else { &[MATERIAL] };
-    let columns = rows.header(&SPHERE, optional)?;
-    let mut spheres = Vec::new();
+    let always = kind.columns();
+    let colored = common.is_none() && rows.names_any(&COLOR);
+    let besides: &[&str] = match common {
+        Some(_) => &[],
+        None if colored => &COLOR,
+        None => &[MATERIAL],
+    };
+    let columns = rows.header(always, besides)?;
+    let last = always.len();
+    let mut surfaces = Vec::new();
     rows.each(columns.len(), |row| {
-        let [x, y, z, radius] = [0, 1, 2, 3].map(|k| columns[k]);
-        let center = row.vector::<Point>([x, y, z])?.0;
-        let radius = row.number::<Radius>(radius)?.0;
+        let shape = kind.shape(row, &columns)?;
         let material = match common {
             Some(material) => material,
-            None => material(row.field(columns[4])).map_err(|e| (columns[4], e))?,
+            None if colored => {
+                let color = [columns[last], columns[last + 1], columns[last + 2]];
+                palette.material(row.vector::<Share>(color)?.0)
+            }
+            None => material(row.field(columns[last])).map_err(|e| (columns[last], e))?,
         };
-        spheres.push(Primitive {
-            shape: Shape::Sphere { center, radius },
+        surfaces.push(Primitive {
+            shape,
             material,
             line: place.line,
             column: place.column,
         });
         Ok(())
     })?;
-    Ok(spheres)
+    Ok(surfaces)
 }
 
 /// The lights in the text of a file, which is named at `place` of the scene file.
@@ -145,6 +231,12 @@ impl<'a> Rows<'a> {
     fn wrong(&mut self, line: usize, column: usize, message: String) {
         let place = Place { line, column };
         self.errors.push(about(self.path, place, message));
+    }
+
+    /// Whether the first row names one of these columns.
+    fn names_any(&self, names: &[&str]) -> bool {
+        let header = self.lines.clone().next().map_or("", |(_, line)| line);
+        header.split(',').any(|name| names.contains(&name.trim()))
     }
 
     /// Where the columns `wanted`, all of them, stand.
@@ -299,6 +391,15 @@ mod tests {
 
     const PLACE: Place = Place { line: 3, column: 1 };
 
+    fn read_as(
+        kind: RowKind,
+        text: &str,
+        named: impl Fn(&str) -> Result<usize, String>,
+    ) -> Result<Vec<Primitive>, Wrong> {
+        let palette = &mut Palette::new(9);
+        surfaces("x.csv".as_ref(), text, PLACE, kind, None, named, palette)
+    }
+
     fn faults(text: &str) -> Vec<String> {
         let named = |name: &str| {
             if name == "red" {
@@ -307,7 +408,7 @@ mod tests {
                 Err(format!("no {name}"))
             }
         };
-        match spheres("x.csv".as_ref(), text, PLACE, None, named) {
+        match read_as(RowKind::Sphere, text, named) {
             Ok(_) => Vec::new(),
             Err(Wrong::Unreadable(message)) => vec![message],
             Err(Wrong::Content(all)) => all
@@ -320,7 +421,7 @@ mod tests {
     #[test]
     fn columns_may_stand_in_any_order() {
         let text = "radius, z,y,x ,material\n 2,3,4,5, red \n\n1e-3,0,-1,+2.5,red\r\n";
-        let all = spheres("x.csv".as_ref(), text, PLACE, None, |_| Ok(7))
+        let all = read_as(RowKind::Sphere, text, |_| Ok(7))
             .ok()
             .expect("spheres");
         let center = DVec3::new(5.0, 4.0, 3.0);
@@ -338,6 +439,48 @@ mod tests {
             (all[0].normal, all[0].radiance),
             (DVec3::NEG_Y, DVec3::new(9.0, 8.0, 7.0))
         );
+    }
+
+    #[test]
+    fn rows_may_have_colors_and_be_cylinders() {
+        let text = "x1,y1,z1,x2,y2,z2,radius,r,g,b\n0,0,0,0,1,0,0.1,1,0,0.5\n1,0,0,1,1,0,0.2,0,1,0\n2,0,0,2,1,0,0.3,1,0,0.5\n";
+        let mut palette = Palette::new(9);
+        let unnamed =
+            |_: &str| -> Result<usize, String> { unreachable!("there is no such column") };
+        let kind = RowKind::Cylinder;
+        let all = surfaces(
+            "x.csv".as_ref(),
+            text,
+            PLACE,
+            kind,
+            None,
+            unnamed,
+            &mut palette,
+        );
+        let all = all.ok().expect("cylinders");
+        let materials: Vec<usize> = all.iter().map(|p| p.material).collect();
+        assert_eq!(materials, [9, 10, 9]);
+        assert_eq!(palette.colors, [DVec3::new(1.0, 0.0, 0.5), DVec3::Y]);
+        let (base, top) = (DVec3::X, DVec3::new(1.0, 1.0, 0.0));
+        let radius = 0.2;
+        assert_eq!(all[1].shape, Shape::Cylinder { base, top, radius });
+        assert_eq!(
+            faults("x,y,z,radius,r,g,b\n0,0,0,1,1,1.5,0\n"),
+            ["2:11: g is \"1.5\"; g must be a number from 0 to 1"]
+        );
+        assert_eq!(
+            faults("x,y,z,radius,r,g\n"),
+            ["1:0: no column b; the first row must name the columns x, y, z, radius, r, g, b"]
+        );
+        let Err(Wrong::Content(flat)) = read_as(
+            RowKind::Cylinder,
+            "x1,y1,z1,x2,y2,z2,radius,material\n1,2,3,1,2,3,1,red\n",
+            |_| Ok(7),
+        ) else {
+            panic!("no cylinder");
+        };
+        assert_eq!((flat[0].line, flat[0].column), (2, 7));
+        assert!(flat[0].message.starts_with("x2, y2, z2 equal x1, y1, z1"));
     }
 
     #[test]

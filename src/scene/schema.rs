@@ -1,6 +1,7 @@
 //! JSON Schema of scene files, for completion, hover texts and error checking in editors.
 
 use super::format::{self, Found, Need, ShapeKind, Table};
+use super::rows::RowKind;
 use super::value::{Text, Value};
 use super::{MaterialKind, Place};
 use serde_json::{Map, Value as Json, json};
@@ -34,9 +35,16 @@ pub fn schema() -> Json {
         let table = describe(kind.about(), |t| format::primitive(t, kind));
         properties.insert(kind.name().into(), json!({"type": "array", "items": table}));
     }
-    let about = "Spheres from a CSV file.";
-    let table = describe(about, format::spheres);
-    properties.insert("spheres".into(), json!({"type": "array", "items": table}));
+    for (kind, about) in [
+        (RowKind::Sphere, "Spheres from a CSV file."),
+        (RowKind::Cylinder, "Cylinders from a CSV file."),
+    ] {
+        let table = describe(about, |t| format::surfaces(t, kind));
+        properties.insert(
+            kind.table().into(),
+            json!({"type": "array", "items": table}),
+        );
+    }
     let about = "Lights from a CSV file.";
     let table = describe(about, format::lights);
     properties.insert("lights".into(), json!({"type": "array", "items": table}));
@@ -49,7 +57,7 @@ pub fn schema() -> Json {
 
     let some = |name: &str| json!({"required": [name], "properties": {name: {"minItems": 1}}});
     let mut some_primitive: Vec<Json> = ShapeKind::ALL.map(|kind| some(kind.name())).into();
-    some_primitive.push(some("spheres"));
+    some_primitive.extend([some("spheres"), some("cylinders")]);
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "etendue scene",

@@ -11,19 +11,29 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Pictures with error layers (films, and EXR files written by etendue) need no threshold: the test compares them up to their \
 noise, and --alpha is its false-alarm rate. Other pictures need a limit (--max-flip or --max-relative-rmse); noise then \
-counts as a difference.
+counts as a difference. Several independent renders of each side state their noise by their spread.
 
 Examples:
   etendue compare before.exr after.exr
   etendue compare before.exr after.npz --html report.html
   etendue compare before.png after.png --max-flip 0.05
+  etendue compare --a old1.exr old2.exr old3.exr old4.exr --b new1.exr new2.exr new3.exr new4.exr
+      four renders of each side, with four seeds, by any program
 
 Exit status: 0 equal, 1 different, 2 not comparable, 4 a file can't be read or written.")]
 pub struct CompareArgs {
     /// Reference picture: .exr, .png, or .npz (a film)
-    pub a: PathBuf,
+    #[arg(required_unless_present = "renders_a", conflicts_with_all = ["renders_a", "renders_b"])]
+    pub a: Option<PathBuf>,
     /// Picture to compare with it
-    pub b: PathBuf,
+    #[arg(required_unless_present = "renders_a")]
+    pub b: Option<PathBuf>,
+    /// Independent renders of the reference, by any program: their spread is its noise
+    #[arg(long = "a", id = "renders_a", value_name = "FILE", num_args = 1.., requires = "renders_b")]
+    pub renders_a: Vec<PathBuf>,
+    /// Independent renders to compare with it
+    #[arg(long = "b", id = "renders_b", value_name = "FILE", num_args = 1.., requires = "renders_a")]
+    pub renders_b: Vec<PathBuf>,
     /// Probability that two pictures of the same scene are reported as different
     #[arg(long, value_name = "P", default_value_t = DEFAULT_ALPHA, value_parser = values::probability,
           allow_hyphen_values = true)]
@@ -37,6 +47,9 @@ pub struct CompareArgs {
     /// Write an HTML page with both pictures, their difference and all numbers
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Write the verdict and all numbers as JSON. With - they go to stdout, and the text goes to stderr
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
 
     /// How much to print.
     #[command(flatten)]
@@ -50,10 +63,13 @@ Each scene DIR/NAME.toml is rendered with the settings and sample count of its g
 a different seed. The two are compared as by `etendue compare`. A scene that differs leaves golden/NAME.actual.npz and \
 golden/NAME.report.html.
 
---bless leaves goldens alone that still pass, unless --size, --power or --max-spp asks for others.
+--bless leaves goldens alone that still pass, unless --size, --power or --max-spp asks for others. --review and --accept change only goldens of scenes that fail, are new, or were changed.
 
 Examples:
   etendue regress scenes --bless
+  etendue regress scenes --review
+  etendue regress scenes --accept downloaded
+      the films of a failed run in CI become the goldens
   etendue regress scenes --junit results.xml --html results.html
   etendue regress scenes --filter glass
 
@@ -64,8 +80,14 @@ pub struct RegressArgs {
     /// Folder with the scenes
     pub dir: PathBuf,
     /// Create the goldens, and re-create those that no longer pass
-    #[arg(long)]
+    #[arg(long, group = "making")]
     pub bless: bool,
+    /// Show what changed, old beside new, and ask before each golden is created or re-created
+    #[arg(long, group = "making")]
+    pub review: bool,
+    /// Make goldens of the films NAME.actual.npz that a failed run left in the folder RESULTS or below it, without rendering
+    #[arg(long, value_name = "RESULTS", conflicts_with_all = ["making", "junit", "html", "summary"])]
+    pub accept: Option<PathBuf>,
     /// Run only scenes whose name contains TEXT
     #[arg(long, value_name = "TEXT")]
     pub filter: Option<String>,
@@ -86,18 +108,21 @@ pub struct RegressArgs {
     /// Write an HTML page with all results
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Write the results as Markdown, such as to $GITHUB_STEP_SUMMARY
+    #[arg(long, value_name = "FILE")]
+    pub summary: Option<PathBuf>,
 
     /// Smallest change of the whole picture's brightness to detect with 95 % probability. Sets the number of samples [default: 1%]
     #[arg(long, value_name = "X", value_parser = values::change, allow_hyphen_values = true,
-          requires = "bless", help_heading = "With --bless")]
+          requires = "making", help_heading = "With --bless or --review")]
     pub power: Option<f64>,
     /// Most samples per pixel. At least 2 strata² are taken, so that the error can be estimated [default: 4096]
     #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true,
-          requires = "bless", help_heading = "With --bless")]
+          requires = "making", help_heading = "With --bless or --review")]
     pub max_spp: Option<u64>,
     /// Width and height in pixels [default: the scene's, scaled to 64 wide]
-    #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, requires = "bless",
-          help_heading = "With --bless")]
+    #[arg(long, value_name = "WxH", value_parser = values::size, allow_hyphen_values = true, requires = "making",
+          help_heading = "With --bless or --review")]
     pub size: Option<[u32; 2]>,
 
     /// What to render on: gpu is any adapter, cpu the f64 reference, auto the best available

@@ -1,5 +1,7 @@
 //! `etendue regress` and the assertion, on the CPU reference.
 
+mod accept;
+
 use assert_cmd::Command;
 use etendue::engine::Engine;
 use etendue::film::Film;
@@ -73,6 +75,16 @@ impl Folder {
             .args(["--backend", "cpu"])
             .args(flags)
             .assert()
+    }
+
+    /// Replaces a golden by one of a brighter lamp that says it is of the scene: the renderer has changed since.
+    fn spoil(&self, name: &str) {
+        let path = self.golden(&format!("{name}.exr"));
+        let samples = read_exr(&path).unwrap().samples.unwrap()[0];
+        let brighter = BALL.replace("20.0, 20.0, 20.0", "24.0, 24.0, 24.0");
+        let (film, _) = render(&brighter, 5, samples.into());
+        let (_, provenance) = render(BALL, 5, samples.into());
+        write_exr(&path, &film, &provenance, ExrChannels::All).expect("written");
     }
 
     fn bless(&self) {
@@ -232,14 +244,7 @@ fn failures_leave_a_film_and_a_report() {
     let f = Folder::new(&["one", "two"]);
     f.bless();
     // A golden of the same hash, but of a brighter lamp: the renderer has changed, not the scene.
-    let samples = read_exr(&f.golden("one.exr")).unwrap().samples.unwrap()[0];
-    let (film, _) = render(
-        &BALL.replace("20.0, 20.0, 20.0", "24.0, 24.0, 24.0"),
-        5,
-        samples.into(),
-    );
-    let (_, provenance) = render(BALL, 5, samples.into());
-    write_exr(&f.golden("one.exr"), &film, &provenance, ExrChannels::All).expect("written");
+    f.spoil("one");
     let junit = f.path("r.xml");
     f.run(&["--junit", junit.to_str().unwrap()])
         .code(1)
@@ -516,20 +521,7 @@ fn a_scene_is_chosen_by_its_whole_name() {
         .code(2)
         .stderr(contains("no scene or golden has the name \"on\""));
     f.bless();
-    let samples = read_exr(&f.golden("one more.exr"))
-        .unwrap()
-        .samples
-        .unwrap()[0];
-    let brighter = BALL.replace("20.0, 20.0, 20.0", "24.0, 24.0, 24.0");
-    let (film, _) = render(&brighter, 5, samples.into());
-    let (_, provenance) = render(BALL, 5, samples.into());
-    write_exr(
-        &f.golden("one more.exr"),
-        &film,
-        &provenance,
-        ExrChannels::All,
-    )
-    .expect("written");
+    f.spoil("one more");
     f.run(&["--quiet"])
         .code(1)
         .stdout(contains("--bless --scene 'one more'"))
