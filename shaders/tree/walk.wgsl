@@ -1,4 +1,5 @@
-// Walking a bounding volume hierarchy that is four wide. The walk itself is generated for each kind of surface: see descent.wgsl.
+// Walking a bounding volume hierarchy that is four wide, with the children's boxes on a grid of 8 bits [Ylitie2017]. The walk itself is
+// generated for each kind of surface: see descent.wgsl.
 
 // The texture is divided into units of four records. Unit 0 is a node without children: a walk goes there when it is done.
 //

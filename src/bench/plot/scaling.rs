@@ -44,7 +44,7 @@ impl ScalingPanel {
             .map(|n| (n as f64, format!("no light tree up to {n}")));
         Self {
             title: format!("{}, {width}x{height}{on}", scaling.series.name()),
-            things: scaling.series.name(),
+            things: scaling.series.things(),
             curves: scaling.engines.iter().map(curve).collect(),
             marks: baked.into_iter().chain(looked_at).collect(),
         }
