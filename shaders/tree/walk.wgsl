@@ -1,23 +1,23 @@
-// Walking a bounding volume hierarchy without a stack: node k has the children 2k and 2k + 1, and one bit for each level says
-// whether the sibling of the node there is still to be visited. The walk itself is generated for each kind of surface.
+// Walking a bounding volume hierarchy that is four wide, with the children's boxes on a grid of 8 bits [Ylitie2017]. The walk itself is
+// generated for each kind of surface: see descent.wgsl.
 
-// Each node has four records. The first three hold twelve words, six for each child.
+// The texture is divided into units of four records. Unit 0 is a node without children: a walk goes there when it is done.
 //
-//   a box      least corner, greatest corner
-//   a sphere   centre, radius, item, LEAF
+//   a node      origin of the grid, marks; the least coordinates of its children's boxes, by axis, and the greatest along x; the
+//               greatest along y and z, unit of the first child, 0
+//   a sphere    centre, radius; item, solid, parent
+//   a disk      centre, radius; normal, offset; item, face
+//   a cylinder  base, radius; axis, offset; faces, 0; top, solid, parent, item
 //
-// An item is 2 (number of the surface + 1), + 1 if the surface can block light. If spheres bound solids, the fourth record holds the
-// solid and its parent of either child. Every other surface has a node of its own:
+// The coordinates are steps of the grid, 8 bits each, of the first child in the lowest ones. The marks are, from the lowest bit, the
+// exponents of the step along x, y and z, as f32 has them; in four bits the number of children; and in the highest bit a 1. Children
+// stand side by side. An item is 2 (number of the surface + 1), + 1 if the surface can block light.
 //
-//   a disk     centre, radius; normal, offset; item, face, 0, LEAF
-//   the rest   item in the first word, LEAF in the twelfth
-//
-// A header of four records stands before each tree. Its first record is a sphere around the tree: centre and radius. Node 0 has two
-// boxes that nothing meets: a walk goes there when it is done.
-const LEAF: u32 = 0xffffffffu;
+// Before each tree stands a header: a sphere around the tree; unit of the root, unit of the next header of the same kind of surface or 0.
+const NODE_MARK: u32 = 0x80000000u;
 
-// Farther than anything.
-const MISSED: f32 = 1.0e38;
+// The word for a child that is not met, or not there. Words of others are less.
+const NO_CHILD: u32 = 0xffffffffu;
 
 // Loop trips left to the invocation: see trips/counted.wgsl. When none are left, the result of the walk is not used, and the sample begins
 // again in the next dispatch.
@@ -54,7 +54,7 @@ fn put_back(hit: Hit, near: Approach, first: Hit) -> Hit {
 struct Slabs {
     // The ray's origin, moved by the greatest rounding error of the origin or of a hit: `enter` for the sides of a box by which the ray
     // enters, `leave` for those by which it leaves. The walk must not miss what a loop over all surfaces would meet. The boxes make up
-    // for the rounding errors of what they hold: see src/world/tree.rs.
+    // for the rounding errors of what they hold: see src/world/tree/mod.rs.
     enter: vec3f,
     leave: vec3f,
     inverse: vec3f,
@@ -66,39 +66,78 @@ fn slabs_of(ray: Ray) -> Slabs {
     let d = select(ray.d, vec3f(1.0e-20), abs(ray.d) < vec3f(1.0e-20));
     let inverse = 1.0 / d;
     let backwards = d < vec3f(0.0);
-    // About sixteen units in the last place of f32.
-    let slack = 1.0e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z));
+    // About twenty units in the last place of f32.
+    let slack = 1.2e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z));
     let against = select(vec3f(slack), vec3f(-slack), backwards);
     return Slabs(ray.o + against, ray.o - against, inverse, backwards);
 }
 
-// Where the ray enters the box, if no farther than t, else MISSED.
-fn box_entry(s: Slabs, low: vec3f, high: vec3f, t: f32) -> f32 {
-    let enter = (select(low, high, s.backwards) - s.enter) * s.inverse;
-    let leave = (select(high, low, s.backwards) - s.leave) * s.inverse;
-    let near = fmax(fmax(enter.x, enter.y), fmax(enter.z, 0.0));
-    let far = fmin(fmin(leave.x, leave.y), fmin(leave.z, t));
-    // The distances themselves have rounding errors.
-    return select(MISSED, near, near * 0.99999 <= far);
+fn is_node(a: vec4u) -> bool {
+    return a.w >= NODE_MARK;
 }
 
-// Where a walk is: a node, and one bit for each level that says whether the sibling there is still to be visited. The lowest bit is for the
-// level of the node.
-struct Place {
-    node: u32,
-    siblings: u32,
+// Coordinates of four children, in steps of the grid.
+fn on_grid(word: u32) -> vec4f {
+    return vec4f(bitcast<vec4i>((vec4u(word) >> vec4u(0u, 8u, 16u, 24u)) & vec4u(255u)));
 }
 
-// The next node: the nearer child that is met, or else the last sibling that was put off.
-fn onward(at: Place, entry_0: f32, entry_1: f32) -> Place {
-    let second = entry_1 < entry_0;
-    let met = fmin(entry_0, entry_1) < MISSED;
-    let both = fmax(entry_0, entry_1) < MISSED;
-    let levels = firstTrailingBit(at.siblings | 0x80000000u);
-    let node = select((at.node >> levels) ^ 1u, 2u * at.node + u32(second), met);
-    let siblings = select((at.siblings >> levels) ^ 1u, 2u * at.siblings + u32(both), met);
-    let over = !met && at.siblings == 0u;
-    return Place(select(node, 0u, over), select(siblings, 0u, over));
+fn fmax4(a: vec4f, b: vec4f) -> vec4f {
+    return select(b, a, a > b);
+}
+
+fn fmin4(a: vec4f, b: vec4f) -> vec4f {
+    return select(b, a, a < b);
+}
+
+// The children of a node whose boxes the ray meets no farther than t, the nearest first: the lowest two bits of a word are the number of
+// the child. The other bits are where the ray enters, as f32, which orders positive numbers like integers.
+fn children_met(s: Slabs, a: vec4u, b: vec4u, c: vec4u, t: f32) -> vec4u {
+    let origin = bitcast<vec3f>(a.xyz);
+    let steps = bitcast<vec3f>(((vec3u(a.w) >> vec3u(0u, 8u, 16u)) & vec3u(255u)) << vec3u(23u)) * s.inverse;
+    // Where the ray passes the origin of the grid.
+    let enter = (origin - s.enter) * s.inverse;
+    let leave = (origin - s.leave) * s.inverse;
+    let high = vec3u(b.w, c.xy);
+    let by = select(b.xyz, high, s.backwards);
+    let to = select(high, b.xyz, s.backwards);
+    let near_xy = fmax4(on_grid(by.x) * steps.x + enter.x, on_grid(by.y) * steps.y + enter.y);
+    let near = fmax4(near_xy, fmax4(on_grid(by.z) * steps.z + enter.z, vec4f(0.0)));
+    let far_xy = fmin4(on_grid(to.x) * steps.x + leave.x, on_grid(to.y) * steps.y + leave.y);
+    let far = fmin4(far_xy, fmin4(on_grid(to.z) * steps.z + leave.z, vec4f(t)));
+    // The distances themselves have rounding errors. A child that is not there is not met, whatever its coordinates.
+    let number = vec4u(0u, 1u, 2u, 3u);
+    let there = number < vec4u(select(0u, (a.w >> 24u) & 7u, is_node(a)));
+    let met = there & (near * 0.99999 <= far);
+    let word = select(vec4u(NO_CHILD), (bitcast<vec4u>(near) & vec4u(0xfffffffcu)) | number, met);
+    // A sorting network.
+    let low_0 = min(word.xz, word.yw);
+    let high_0 = max(word.xz, word.yw);
+    let middle = vec2u(max(low_0.x, low_0.y), min(high_0.x, high_0.y));
+    let first = min(low_0.x, low_0.y);
+    let last = max(high_0.x, high_0.y);
+    return vec4u(first, min(middle.x, middle.y), max(middle.x, middle.y), last);
+}
+
+// The children after the first, in one word: in 25 bits the unit of child 0; below these, a 1 and then the numbers of the children, two
+// bits each, the next one in the lowest. 0 if there are none.
+fn put_off(unit: u32, met: vec4u) -> u32 {
+    let one = met.y & 3u;
+    let two = one | ((met.z & 3u) << 2u);
+    let three = two | ((met.w & 3u) << 4u);
+    var numbers = select(4u | one, 16u | two, met.z != NO_CHILD);
+    numbers = select(numbers, 64u | three, met.w != NO_CHILD);
+    return select(0u, (unit << 7u) | numbers, met.y != NO_CHILD);
+}
+
+// The unit of the next of the children that were put off; 0 if none was.
+fn next_of(word: u32) -> u32 {
+    return (word >> 7u) + (word & 3u);
+}
+
+// What is left without that one.
+fn without_next(word: u32) -> u32 {
+    let rest = (word & 0xffffff80u) | ((word & 127u) >> 2u);
+    return select(rest, 0u, (word & 0x7cu) == 4u);
 }
 
 // The nearer of two hits. If both are at the same distance, the lower key wins: its surface comes first in the scene, and a walk may find

@@ -154,7 +154,7 @@ pub struct MakeSceneArgs {
     /// Seed of the generator: each gives a different scene of the same kind
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = values::seed(), allow_hyphen_values = true)]
     pub seed: u32,
-    #[arg(help = format!("Scene file to write [default: spheres.toml or lights.toml]. More than {MOST_IN_TABLES} objects go to a \
+    #[arg(help = format!("Scene file to write [default: the kind's name and .toml]. More than {MOST_IN_TABLES} objects go to a \
                           .csv file beside it"))]
     /// `--output`.
     #[arg(short, long, value_name = "FILE.toml")]
@@ -210,6 +210,8 @@ pub enum ExportTarget {
 pub enum SceneKind {
     /// Spheres on a floor, placed like the seeds of a sunflower.
     Spheres,
+    /// Equal spheres at random in a box over a floor.
+    Cloud,
     /// Lamps in a hall of columns.
     Lights,
 }

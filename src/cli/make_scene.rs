@@ -11,12 +11,11 @@ use std::path::{Path, PathBuf};
 
 /// Writes a scene with many objects, and the CSV file beside it if it needs one.
 pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
-    let (default, make) = match args.kind {
-        SceneKind::Spheres => (
-            "spheres.toml",
-            generate::spheres as fn(usize, u32, &str) -> _,
-        ),
-        SceneKind::Lights => ("lights.toml", generate::lights as fn(usize, u32, &str) -> _),
+    type Make = fn(usize, u32, &str) -> generate::Generated;
+    let (default, make): (&str, Make) = match args.kind {
+        SceneKind::Spheres => ("spheres.toml", generate::spheres),
+        SceneKind::Cloud => ("cloud.toml", generate::cloud),
+        SceneKind::Lights => ("lights.toml", generate::lights),
     };
     let scene = args.output.clone().unwrap_or(default.into());
     // The CSV file has the same stem: with the ending .csv the scene itself would be overwritten.
@@ -31,7 +30,7 @@ pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
     }
     let rows = scene.with_extension("csv");
     let name = rows.file_name().unwrap_or_default().to_string_lossy();
-    let made: generate::Generated = make(args.count as usize, args.seed, &name);
+    let made = make(args.count as usize, args.seed, &name);
     let rows = made.rows.as_ref().map(|text| (&rows, text));
     let files: Vec<(&PathBuf, &String)> = rows.into_iter().chain([(&scene, &made.scene)]).collect();
     if !args.force {

@@ -262,6 +262,16 @@ fn crowd(r: &mut Uniform, of_each: usize) -> String {
     s
 }
 
+/// The same, and far away a giant of each kind, which shares a function, and might share a tree, with the small things.
+fn crowd_and_giants(r: &mut Uniform, of_each: usize) -> String {
+    let mut s = crowd(r, of_each);
+    sphere(&mut s, [2e7, 0.0, 0.0], 2e4, "white");
+    disk(&mut s, "disk", [0.0, 2e7, 0.0], [0.0, 1.0, 1.0], 2e4);
+    let (base, top) = ([0.0, 0.0, -2e7], [0.0, 1e5, -2e7]);
+    cylinder(&mut s, base, top, 2e4, "white");
+    s
+}
+
 /// A ray from afar is known only to 2^-24 of its distance. It may meet another thing than it should by that much, but it is one ray: the
 /// walk visits no more of the tree than one from near by.
 #[test]
@@ -277,56 +287,61 @@ fn a_walk_from_afar_is_as_short_as_one_from_near_by() {
     const EACH: usize = 20_000;
     let gpu = Gpu::open(&Choice::default()).expect("an adapter");
     let mut r = Uniform(12);
-    let scene = parse_str("crowd.toml".as_ref(), &crowd(&mut r, 1000)).expect("a scene");
-    let settings = Settings::resolve(&scene, &Overrides::default());
-    let world = World::new(&scene, settings.size);
-    let source = scene_probe_source(&world, &settings, Access::Tree, BODY);
-    let probe = Probe::compile(&gpu, &source, Some(Access::Tree)).expect("a probe");
-    let boxes = world.primitives.iter().filter_map(|p| p.geometry.bounds());
-    let corners: Vec<[DVec3; 2]> = boxes.map(|b| [b.min, b.max]).collect();
-    let low = corners
-        .iter()
-        .map(|c| c[0])
-        .reduce(DVec3::min)
-        .expect("things");
-    let high = corners
-        .iter()
-        .map(|c| c[1])
-        .reduce(DVec3::max)
-        .expect("things");
-    // The mean of hits, the mean of trips, and the most trips of rays towards the box from so many of its sizes away.
-    let mut of = |distance: f64| -> (f64, f64, f64) {
-        let inputs: Vec<Values> = (0..EACH)
-            .map(|_| {
-                let out = DVec3::from_array(vector(&mut r, 1.0)).normalize();
-                let to = low + (high - low) * DVec3::from_array([(); 3].map(|()| r.next()));
-                let from = (to + distance * (high - low).length() * out).as_vec3();
-                let d = -out.as_vec3();
-                let mut x: Values = [0.0; 16];
-                x[..3].copy_from_slice(&from.to_array());
-                x[3..6].copy_from_slice(&d.to_array());
-                x
-            })
-            .collect();
-        let outputs = probe.run(&gpu, Some(&world), &inputs).expect("outputs");
-        let mean = |k: usize| outputs.iter().map(|y| f64::from(y[k])).sum::<f64>() / EACH as f64;
-        let longest = outputs.iter().map(|y| f64::from(y[2])).fold(0.0, f64::max);
-        (mean(0), mean(2), longest)
-    };
-    let (hits, trips, longest) = of(5.0);
-    assert!(hits > 0.1, "{hits}");
-    for distance in [1e2, 1e4, 1e6, 1e8] {
-        let far = of(distance);
-        println!("{distance:e}: {far:?}");
-        // The share of hits is that of near rays, to eight standard errors. From 1e8 sizes away, a point in f32 is no longer on its ray.
-        assert!(
-            distance > 1e6 || (far.0 - hits).abs() < 0.02,
-            "{distance:e}: {} hits",
-            far.0
-        );
-        assert!(
-            far.1 < 1.1 * trips && far.2 < 2.0 * longest,
-            "{distance:e}: {far:?}, not {trips} {longest}"
-        );
+    let scenes = [
+        ("crowd", crowd(&mut r, 1000)),
+        ("giants", crowd_and_giants(&mut r, 1000)),
+    ];
+    for (name, text) in scenes {
+        let scene = parse_str(format!("{name}.toml").as_ref(), &text).expect("a scene");
+        let settings = Settings::resolve(&scene, &Overrides::default());
+        let world = World::new(&scene, settings.size);
+        let source = scene_probe_source(&world, &settings, Access::Tree, BODY);
+        let probe = Probe::compile(&gpu, &source, Some(Access::Tree)).expect("a probe");
+        // Where the small things are, in the world's coordinates.
+        let boxes = world.primitives.iter().filter_map(|p| p.geometry.bounds());
+        let small = boxes.filter(|b| (b.max - b.min).max_element() < 1.0);
+        let corners: Vec<[DVec3; 2]> = small.map(|b| [b.min, b.max]).collect();
+        let low = corners.iter().map(|c| c[0]).reduce(DVec3::min);
+        let high = corners.iter().map(|c| c[1]).reduce(DVec3::max);
+        let (low, high) = (low.expect("things"), high.expect("things"));
+        // The mean of hits, the mean of trips, and the most trips of rays towards the box from so many of its sizes away.
+        let mut of = |distance: f64| -> (f64, f64, f64) {
+            let inputs: Vec<Values> = (0..EACH)
+                .map(|_| {
+                    let out = DVec3::from_array(vector(&mut r, 1.0)).normalize();
+                    let to = low + (high - low) * DVec3::from_array([(); 3].map(|()| r.next()));
+                    let from = (to + distance * (high - low).length() * out).as_vec3();
+                    let d = -out.as_vec3();
+                    let mut x: Values = [0.0; 16];
+                    x[..3].copy_from_slice(&from.to_array());
+                    x[3..6].copy_from_slice(&d.to_array());
+                    x
+                })
+                .collect();
+            let outputs = probe.run(&gpu, Some(&world), &inputs).expect("outputs");
+            let mean =
+                |k: usize| outputs.iter().map(|y| f64::from(y[k])).sum::<f64>() / EACH as f64;
+            let longest = outputs.iter().map(|y| f64::from(y[2])).fold(0.0, f64::max);
+            (mean(0), mean(2), longest)
+        };
+        let near = of(5.0);
+        let (hits, trips, longest) = near;
+        println!("{name}: {near:?}");
+        assert!(hits > 0.1, "{name}: {hits}");
+        for distance in [1e2, 1e4, 1e6, 1e8] {
+            let far = of(distance);
+            println!("{name}, {distance:e}: {far:?}");
+            // The share of hits is that of near rays, to eight standard errors. From 1e8 sizes away, a point in f32 is no longer on
+            // its ray.
+            assert!(
+                distance > 1e6 || (far.0 - hits).abs() < 0.02,
+                "{name}, {distance:e}: {} hits",
+                far.0
+            );
+            assert!(
+                far.1 < 1.1 * trips && far.2 < 2.0 * longest,
+                "{name}, {distance:e}: {far:?}, not {trips} {longest}"
+            );
+        }
     }
 }

@@ -4,6 +4,7 @@ use super::Gpu;
 use super::pack::Packed;
 use crate::kernel::Access;
 use crate::kernel::records::RECORDS_A_ROW;
+use crate::kernel::trees::{MAX_UNITS, UNIT};
 use wgpu::util::DeviceExt as _;
 
 /// What is only read: nothing; surfaces, materials and lights; or records.
@@ -118,8 +119,9 @@ pub(super) fn too_large(packed: &Packed, surfaces: usize, limits: &wgpu::Limits)
         }
         Packed::Records(records) => {
             let rows = records.len().div_ceil(RECORDS_A_ROW as usize);
-            let most = limits.max_texture_dimension_2d;
-            (rows > most as usize).then(|| {
+            let most = (limits.max_texture_dimension_2d as usize)
+                .min(MAX_UNITS * UNIT / RECORDS_A_ROW as usize);
+            (rows > most).then(|| {
                 format!(
                     "{surfaces} surfaces with their trees need a texture of {rows} rows of {RECORDS_A_ROW}, but it allows at most {most}"
                 )

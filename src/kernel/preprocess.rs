@@ -38,12 +38,17 @@ pub(super) fn run(text: &str, flag: impl Fn(Flag) -> bool) -> String {
     out
 }
 
-/// A template's text from its first function on, with each `$name` replaced by its value.
+/// A template's text from its first declaration on, with each `$name` replaced by its value.
 ///
 /// # Panics
 /// If a name has no value.
 pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
-    let start = template.find("fn ").unwrap_or(0);
+    let declarations = ["struct ", "fn "].map(|word| template.find(&format!("\n{word}")));
+    let start = declarations
+        .into_iter()
+        .flatten()
+        .min()
+        .map_or(0, |at| at + 1);
     let mut out = String::with_capacity(template.len());
     let mut rest = &template[start..];
     while let Some((before, after)) = rest.split_once('$') {

@@ -1,6 +1,6 @@
 //! The layout of the texture of records that kernels with trees read.
 
-use super::trees::Parted;
+use super::trees::{Parted, UNIT};
 use crate::world::World;
 use crate::world::light_tree::{LIGHTS_A_CLUSTER, ends, serves};
 use std::fmt::Write as _;
@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 /// Records of four words in a row of the texture.
 pub(crate) const RECORDS_A_ROW: u32 = 4096;
 
-/// The number of the first record of each kind. Trees begin at 0.
+/// The number of the first record of each kind. The headers of trees begin at 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Records {
     /// Four for each surface.
@@ -24,8 +24,8 @@ pub(crate) struct Records {
     pub fours: usize,
     /// A word for each light.
     pub places: usize,
-    /// After the last.
-    pub end: usize,
+    /// Trees: the rest.
+    pub trees: usize,
 }
 
 impl Records {
@@ -43,7 +43,7 @@ impl Records {
         let clusters = lights_at + 3 * lights;
         let fours = clusters + 2 * 4 * ends;
         let places = fours + ends;
-        let end = places
+        let end_of_places = places
             + if ends > 0 {
                 lights.div_ceil(LIGHTS_A_CLUSTER)
             } else {
@@ -56,7 +56,7 @@ impl Records {
             clusters,
             fours,
             places,
-            end,
+            trees: end_of_places.next_multiple_of(UNIT),
         }
     }
 

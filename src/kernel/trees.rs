@@ -1,14 +1,16 @@
 //! Which surfaces of a large scene lie in trees, and the WGSL that walks those trees.
 //!
-//! All surfaces that one function of the shaders meets share a tree, so that a walk calls just that function. Surfaces without bounds,
+//! All surfaces that one function of the shaders meets share a tree, so that a walk calls just that function; a few that lie far away
+//! have another. Surfaces without bounds,
 //! and groups with few members, are met one by one, as in small scenes.
 
 use super::access::BAKED_LIMIT;
-use super::emit::surfaces::{Function, Target, Variant, for_shadows, targets};
+use super::emit::surfaces::{Function, Target, for_shadows, targets};
 use super::layout::ShapeKind;
-use super::modules::{Module, WALK_BOXES, WALK_DISKS, WALK_SPHERES};
+use super::modules::{DESCENT, LEAF_CYLINDER, LEAF_DISK, LEAF_SPHERE, Module};
 use super::preprocess::fill;
 use crate::world::{Bounds, Tree, World};
+use glam::DVec3;
 use std::fmt::Write as _;
 
 /// The least members of a group that gets a tree: the first of these numbers that leaves at most [`BAKED_LIMIT`] bounded surfaces to be
@@ -22,41 +24,15 @@ pub(crate) struct Group {
     pub function: Function,
     /// Their numbers, lights first.
     pub numbers: Vec<usize>,
-    /// Number of the tree's first record, a multiple of four. Four records are the header; the nodes follow.
+    /// The unit of the header of their first tree. Units have [`UNIT`] records.
     pub header: usize,
 }
 
-impl Group {
-    /// Number of the record after their tree.
-    pub fn end(&self) -> usize {
-        self.header + 4 * (1 + self.nodes())
-    }
+/// The records of a unit: a node, a leaf, or a header.
+pub(crate) const UNIT: usize = 4;
 
-    /// The number of nodes, node 0 included.
-    pub fn nodes(&self) -> usize {
-        let all = Tree::numbers(self.numbers.len());
-        if self.spheres() {
-            (all / 2).max(2)
-        } else {
-            all
-        }
-    }
-
-    /// Whether nodes hold the surfaces themselves.
-    pub fn spheres(&self) -> bool {
-        self.function.shape == ShapeKind::Sphere
-    }
-
-    /// Whether they are disks, whose leaves hold them.
-    pub fn disks(&self) -> bool {
-        self.function.shape == ShapeKind::Disk
-    }
-
-    /// Whether they are spheres that bound solids.
-    pub fn solids(&self) -> bool {
-        self.spheres() && self.function.variant == Variant::Boundary
-    }
-}
+/// The most units, those before the trees included: a walk has 25 bits for the number of one that it puts off.
+pub(crate) const MAX_UNITS: usize = 1 << 25;
 
 /// A scene's surfaces, divided into trees and the rest.
 pub(crate) struct Parted {
@@ -67,20 +43,22 @@ pub(crate) struct Parted {
 }
 
 impl Parted {
-    /// Depends only on the functions and how many surfaces each meets. In small scenes, which need no trees, every surface that can
-    /// goes into one, so that tests reach every part.
+    /// In small scenes, which need no trees, every surface that can goes into one, so that tests reach every part.
     pub fn new(world: &World) -> Self {
         let all = targets(world);
-        let bounded = |t: &Target| bounds(world, t.number).is_some();
-        let mut kinds: Vec<(Function, usize)> = Vec::new();
-        for s in all.iter().filter(|s| bounded(s)) {
+        let mut kinds: Vec<(Function, Vec<usize>)> = Vec::new();
+        for s in all.iter().filter(|s| bounds(world, s.number).is_some()) {
             match kinds.iter_mut().find(|k| k.0 == s.function) {
-                Some(kind) => kind.1 += 1,
-                None => kinds.push((s.function, 1)),
+                Some(kind) => kind.1.push(s.number),
+                None => kinds.push((s.function, vec![s.number])),
             }
         }
-        let left =
-            |least: usize| -> usize { kinds.iter().map(|k| k.1).filter(|n| *n < least).sum() };
+        let kinds: Vec<(Function, Vec<usize>)> = kinds
+            .into_iter()
+            .flat_map(|(f, numbers)| by_distance(world, numbers).map(move |n| (f, n)))
+            .collect();
+        let sizes = || kinds.iter().map(|k| k.1.len());
+        let left = |least: usize| sizes().filter(|n| *n < least).sum::<usize>();
         let least = if all.len() <= BAKED_LIMIT {
             1
         } else {
@@ -89,30 +67,65 @@ impl Parted {
                 .find(|l| left(*l) <= BAKED_LIMIT)
                 .unwrap_or(1)
         };
-        let mut header = 0;
-        let mut groups = Vec::new();
-        for (function, count) in kinds {
-            if count < least {
-                continue;
-            }
-            let of_kind = all.iter().filter(|s| s.function == function);
-            let group = Group {
+        let in_trees = kinds.into_iter().filter(|k| k.1.len() >= least);
+        let groups: Vec<Group> = in_trees
+            .enumerate()
+            .map(|(k, (function, numbers))| Group {
                 function,
-                numbers: of_kind.map(|s| s.number).collect(),
-                header,
-            };
-            header = group.end();
-            groups.push(group);
+                numbers,
+                // Unit 0 is where a walk ends.
+                header: 1 + k,
+            })
+            .collect();
+        let mut apart = vec![true; all.len()];
+        for &number in groups.iter().flat_map(|g| &g.numbers) {
+            apart[number] = false;
         }
-        let in_tree = |s: &Target| groups.iter().any(|g| g.function == s.function);
-        let apart = all.into_iter().filter(|s| !in_tree(s)).collect();
+        let apart = all.into_iter().filter(|t| apart[t.number]).collect();
         Self { groups, apart }
     }
 
-    /// Number of the record after the trees.
+    /// Number of the record after the headers. The trees themselves stand at the end of the texture, because their sizes are not known
+    /// before they are built.
     pub fn end(&self) -> usize {
-        self.groups.last().map_or(0, Group::end)
+        UNIT * (1 + self.groups.len())
     }
+}
+
+/// Divides surfaces with bounds: those that lie farther from the middle than a few hundred times as far as half of them are apart from
+/// the others, and so on with these.
+///
+/// A ray is known only to 2⁻²⁴ of its distance from the world's origin. One that starts on a thing far away would meet all boxes of the
+/// crowd in the middle, unless the crowd has a tree of its own, to which the ray can be moved first: see `approach` of
+/// `shaders/tree/walk.wgsl`.
+fn by_distance(world: &World, numbers: Vec<usize>) -> impl Iterator<Item = Vec<usize>> {
+    // Half as far as `approach` leaves rays as they are.
+    const FAR: f64 = 500.0;
+    // So few boxes may all be met.
+    const FEW: usize = 64;
+
+    let mut parts = Vec::new();
+    let mut rest = numbers;
+    while rest.len() > FEW {
+        let boxes: Vec<Bounds> = rest.iter().filter_map(|&n| bounds(world, n)).collect();
+        let median = |of: &dyn Fn(&Bounds) -> f64| {
+            let mut values: Vec<f64> = boxes.iter().map(of).collect();
+            let half = values.len() / 2;
+            *values.select_nth_unstable_by(half, f64::total_cmp).1
+        };
+        let middle = DVec3::from_array([0, 1, 2].map(|k| median(&|b| 0.5 * (b.min[k] + b.max[k]))));
+        // To the farthest corner: a large thing in the middle is as bad as one far away.
+        let reach = |b: &Bounds| (b.max - middle).abs().max((b.min - middle).abs()).length();
+        let limit = FAR * median(&reach);
+        let far = boxes.iter().map(|b| reach(b) > limit);
+        let (far, near): (Vec<_>, Vec<_>) = far.zip(&rest).partition(|f| f.0);
+        let numbers = |part: Vec<(bool, &usize)>| part.into_iter().map(|f| *f.1).collect();
+        let (near, far) = (numbers(near), numbers(far));
+        parts.push(near);
+        rest = far;
+    }
+    parts.push(rest);
+    parts.into_iter().filter(|p| !p.is_empty())
 }
 
 /// The box around surface number `number`, if it has bounds.
@@ -167,53 +180,73 @@ fn shadow_function(world: &World, group: &Group) -> Function {
     }
 }
 
-/// Loads the record of a node that names the solids its spheres bound, and those around them. Trees of opaque spheres leave it out.
-const LOAD_SOLIDS: &str = "let solids = textureLoad(records, place + vec2u(3u, 0u));";
-
 /// One walk, which calls `function` at the leaves: for the nearest hit, or for `any` hit.
 fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
-    let template: Module = match group.function.shape {
-        ShapeKind::Sphere => WALK_SPHERES,
-        ShapeKind::Disk => WALK_DISKS,
-        _ => WALK_BOXES,
+    let (leaf, shape): (Module, &str) = match group.function.shape {
+        ShapeKind::Sphere => (LEAF_SPHERE, "sphere"),
+        ShapeKind::Disk => (LEAF_DISK, "disk"),
+        ShapeKind::Cylinder => (LEAF_CYLINDER, "cylinder"),
+        ShapeKind::Plane | ShapeKind::HugeSphere => unreachable!("it has no bounds"),
     };
-    let boxes = !group.spheres() && !group.disks();
-    let hit = match (any, boxes) {
-        (false, _) => "Hit(FAR, NONE)",
-        (true, false) => "*hit",
-        (true, true) => "hit",
-    };
-    // Leaves of spheres and disks hold these fields elsewhere, or they follow from the surface's number.
-    let leaf = |field: &str, child: usize| match (field, group.disks()) {
-        ("faces.x", true) => "c.y".to_owned(),
-        ("faces.x", false) => "4u * i + 1u".to_owned(),
-        ("solid", _) => format!("solids.{}", ["x", "z"][child]),
-        ("parent", _) => format!("solids.{}", ["y", "w"][child]),
+    let hit = if any { "hit" } else { "Hit(FAR, NONE)" };
+    // What leaves hold of each kind.
+    let field = |field: &str| match (field, group.function.shape) {
+        ("faces.x", ShapeKind::Sphere) => "4u * i + 1u",
+        ("solid", ShapeKind::Sphere) => "b.y",
+        ("parent", ShapeKind::Sphere) => "b.z",
+        ("faces.x", ShapeKind::Disk) => "c.y",
+        ("faces.x", ShapeKind::Cylinder) => "c.x",
+        ("faces.y", ShapeKind::Cylinder) => "c.y",
+        ("faces.z", ShapeKind::Cylinder) => "c.z",
+        ("solid", ShapeKind::Cylinder) => "d.y",
+        ("parent", ShapeKind::Cylinder) => "d.z",
         _ => unreachable!("leaves have no {field}"),
     };
-    let sphere = |child: usize| function.call_with(hit, "sphere", |f| leaf(f, child), "4u * i");
-    let call = match (group.spheres(), group.disks()) {
-        (true, _) => String::new(),
-        (_, true) => function.call_with(hit, "disk", |f| leaf(f, 0), "4u * i"),
-        _ => function.call(hit, |f| format!("s.{f}"), "i * 4u"),
-    };
-    let calls = if group.spheres() {
-        [0, 1].map(sphere)
-    } else {
-        Default::default()
-    };
-    fill(
-        template.text,
-        &[
-            ("walk", name),
-            ("header", &format!("{}u", group.header)),
-            ("nodes", &format!("{}u", group.header / 4 + 1)),
-            ("goes_on", if any { "hit.key == NONE &&" } else { "" }),
-            ("keep", if any { "keep_blocker" } else { "keep_nearest" }),
-            ("load_solids", if group.solids() { LOAD_SOLIDS } else { "" }),
-            ("call_0", &calls[0]),
-            ("call_1", &calls[1]),
-            ("call", &call),
-        ],
-    ) + "\n"
+    let call = function.call_with(hit, shape, |f| field(f).to_owned(), "4u * i");
+    // A walk through a tree of one thing puts nothing off, but has a place for it.
+    let words = Tree::levels(group.numbers.len()).max(1);
+    let declared: String = (0..words)
+        .map(|k| format!("put_off_{k}: u32,\n    "))
+        .collect();
+    let (header, shift) = (format!("{}u", group.header), shift(words));
+    let values = [
+        ("walk", name),
+        ("header", &header),
+        ("goes_on", if any { "hit.key == NONE &&" } else { "" }),
+        ("keep", if any { "keep_blocker" } else { "keep_nearest" }),
+        ("call", &call),
+        ("words", declared.trim_end()),
+        ("shift", shift.trim_end()),
+    ];
+    [leaf, DESCENT]
+        .map(|template| fill(template.text, &values) + "\n")
+        .concat()
+}
+
+/// Puts a word before those of a place, takes the first one away, or changes it.
+fn shift(words: u32) -> String {
+    let mut s = String::new();
+    for k in 0..words {
+        let _ = writeln!(s, "    let old_{k} = walk.put_off_{k};");
+    }
+    for k in 0..words {
+        let before = match k {
+            0 => "more".to_owned(),
+            _ => format!("old_{}", k - 1),
+        };
+        let after = if k + 1 < words {
+            format!("old_{}", k + 1)
+        } else {
+            "0u".to_owned()
+        };
+        let stays = match k {
+            0 => "select(old_0, rest, !down)".to_owned(),
+            _ => format!("old_{k}"),
+        };
+        let _ = writeln!(
+            s,
+            "    walk.put_off_{k} = select(select({stays}, {before}, push), {after}, pop);"
+        );
+    }
+    s
 }

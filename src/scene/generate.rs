@@ -1,4 +1,4 @@
-//! Generates scenes with many objects: spheres placed like the seeds of a sunflower, and a hall of lamps.
+//! Generates scenes with many objects: spheres placed like the seeds of a sunflower, a cloud of spheres, and a hall of lamps.
 
 use super::parse::parse_with_rows;
 use super::{Diagnostic, Scene};
@@ -140,6 +140,51 @@ radiance = [2.5, 3.5, 5.0]
     list.finish(&mut scene, "spheres", rows)
 }
 
+/// A cloud of `count` equal spheres, at random in a box over a floor. Together they have the same cross-section for every
+/// number, a sixth of a side of the box. `rows` names their CSV file.
+pub fn cloud(count: usize, seed: u32, rows: &str) -> Generated {
+    let mut scene = format!(
+        "title = \"A cloud of {count} spheres\"
+
+[camera]
+eye        = [0.0, 1.2, 4.0]
+look_at    = [0.0, 0.8, 0.0]
+vfov       = 40.0
+resolution = [512, 384]
+
+[material.matt]
+type        = \"diffuse\"
+reflectance = [0.7, 0.7, 0.7]
+
+[[plane]]
+point    = [0.0, -0.2, 0.0]
+normal   = [0.0, 1.0, 0.0]
+material = \"matt\"
+
+[[light]]
+center   = [0.0, 4.0, 1.0]
+normal   = [0.0, -1.0, 0.0]
+radius   = 0.7
+radiance = [9.0, 9.0, 9.0]
+"
+    );
+    let mut list = List::new(count, "x,y,z,radius,material");
+    let radius = 0.15 * (10.0 / count as f64).sqrt();
+    // A few spheres are so large that they would lie in the floor; they are moved up.
+    let lift = (radius - 0.2).max(0.0);
+    for i in 0..count {
+        let [x, y, z] = [0, 1, 2].map(|k| uniform(seed, i, k));
+        let [x, y, z] = [2.4 * x - 1.2, 1.8 * y + lift, 2.4 * z - 1.2];
+        list.add(
+            format_args!("{x:.6},{y:.6},{z:.6},{radius:.7},matt"),
+            format_args!(
+                "\n[[sphere]]\ncenter   = [{x:.6}, {y:.6}, {z:.6}]\nradius   = {radius:.7}\nmaterial = \"matt\"\n"
+            ),
+        );
+    }
+    list.finish(&mut scene, "spheres", rows)
+}
+
 /// A hall of columns under `count` lamps. `rows` names the file for them.
 pub fn lights(count: usize, seed: u32, rows: &str) -> Generated {
     let mut scene = format!(
@@ -272,7 +317,7 @@ mod tests {
 
     #[test]
     fn generated_scenes_have_no_warnings_except_open() {
-        for make in [spheres, lights] {
+        for make in [spheres, cloud, lights] {
             for count in [1, 2, 10, 35, MOST_IN_TABLES] {
                 let made = make(count, 0, "x.csv");
                 let scene = parse_str("x.toml".as_ref(), &made.scene).expect("a scene");
@@ -286,7 +331,7 @@ mod tests {
 
     #[test]
     fn few_objects_are_tables_and_many_are_rows_with_the_same_meaning() {
-        for make in [spheres, lights] {
+        for make in [spheres, cloud, lights] {
             let few = make(MOST_IN_TABLES, 3, "x.csv");
             assert_eq!(few.rows, None);
             let scene = parse_str("x.toml".as_ref(), &few.scene).expect("a scene");

@@ -15,6 +15,7 @@
 //!   exception is a light that pokes through the surface of a solid: [`World::light_scales`].
 
 pub(crate) mod aims;
+mod bounds;
 mod faces;
 mod geometry;
 pub(crate) mod light_tree;
@@ -25,9 +26,10 @@ pub mod trace;
 mod tree;
 pub(crate) mod visibility;
 
+pub use bounds::Bounds;
 pub use geometry::Geometry;
 pub use light_tree::MAX_SCANNED_LIGHTS;
-pub use tree::{Bounds, Node, Tree};
+pub use tree::{Below, Box32, Node, Tree};
 
 use crate::coincidence::slack;
 use crate::scene::{Bsdf, Canonical, Scene};

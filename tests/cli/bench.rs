@@ -284,6 +284,7 @@ fn scaling_shows_the_cost_of_a_path_by_number() {
         .success()
         .stdout(
             says("spheres: 8x6, 3 other surfaces")
+                .and(says("cloud: 8x6, 2 other surfaces"))
                 .and(says("lights: 8x6, 24 other surfaces"))
                 .and(says("ns per path")),
         );
@@ -310,7 +311,7 @@ fn scaling_shows_the_cost_of_a_path_by_number() {
         points.len(),
         "no line crosses that of gpu-tree"
     );
-    for (series, others) in [("spheres", 3), ("lights", 24)] {
+    for (series, others) in [("spheres", 3), ("cloud", 2), ("lights", 24)] {
         for engine in ["cpu", "cpu-brute"] {
             let mine = points
                 .iter()

@@ -235,6 +235,7 @@ fn make_scene_does_not_replace_an_edited_file() {
     for (name, command) in [
         ("few.toml", "make-scene spheres --count 3 -o few.toml"),
         ("many.csv", "make-scene spheres --count 300 -o many.toml"),
+        ("cloud.csv", "make-scene cloud --count 300"),
     ] {
         bench.run(command).success();
         let made = fs::read(bench.path(name)).unwrap();

@@ -1,7 +1,7 @@
 //! Measures seconds per path against the number of objects, and finds the number from which a tree is faster than testing
 //! every object.
 //!
-//! The scenes have 1, 2, 4, ... spheres or lamps, and similar pictures for every number. The engines take turns at each
+//! The scenes have 1, 2, 4, ... spheres, in a sunflower or a cloud, or lamps, and similar pictures for every number. The engines take turns at each
 //! count, so that other load on the machine affects all of them equally.
 
 pub mod crossing;
@@ -36,37 +36,49 @@ const PICTURES: u32 = 3;
 pub enum Series {
     /// [`generate::spheres`].
     Spheres,
+    /// [`generate::cloud`].
+    Cloud,
     /// [`generate::lights`].
     Lights,
 }
 
 impl Series {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Spheres, Self::Lights];
+    pub const ALL: [Self; 3] = [Self::Spheres, Self::Cloud, Self::Lights];
 
-    /// Their name in the plural.
+    /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spheres => "spheres",
+            Self::Cloud => "cloud",
+            Self::Lights => "lights",
+        }
+    }
+
+    /// Its objects, in the plural.
+    pub fn things(self) -> &'static str {
+        match self {
+            Self::Spheres | Self::Cloud => "spheres",
             Self::Lights => "lights",
         }
     }
 
     /// So many of them, in words.
     pub fn of(self, count: usize) -> String {
-        let name = self.name();
-        let name = if count == 1 {
-            &name[..name.len() - 1]
+        let things = self.things();
+        let things = if count == 1 {
+            &things[..things.len() - 1]
         } else {
-            name
+            things
         };
-        format!("{count} {name}")
+        format!("{count} {things}")
     }
 
     /// The scene with `count` objects.
     pub fn scene(self, count: usize) -> Result<Scene, Vec<Diagnostic>> {
         let generated = match self {
             Self::Spheres => generate::spheres(count, 0, "rows.csv"),
+            Self::Cloud => generate::cloud(count, 0, "rows.csv"),
             Self::Lights => generate::lights(count, 0, "rows.csv"),
         };
         generated.parse(Path::new(self.name()))
@@ -245,7 +257,7 @@ pub fn measure(
         scaling.others = surfaces - count;
         scaling.other_lights = match scaling.series {
             Series::Lights => world.lights.len() - count,
-            Series::Spheres => world.lights.len(),
+            Series::Spheres | Series::Cloud => world.lights.len(),
         };
         let all = lines.len() as f64;
         let mut on = Vec::new();

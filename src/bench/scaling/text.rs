@@ -45,7 +45,7 @@ fn devices(scaling: &Scaling) -> String {
 fn columns(scaling: &Scaling) -> String {
     let mut columns = Columns::new(&[
         "engine",
-        scaling.series.name(),
+        scaling.series.things(),
         "compile, s",
         "warm-up, s",
         "samples",

@@ -54,8 +54,8 @@ pub struct BenchArgs {
     /// direct light, both with several lights, and three materials
     #[arg(long, conflicts_with_all = ["reference", "plot"])]
     pub report_table: bool,
-    /// Measure seconds per path against the number of spheres and of lights (1, 2, 4, ...) instead, and find the number from
-    /// which a tree is faster than testing each one. An engine stops at the number where compiling takes seconds or its
+    /// Measure seconds per path against the number of spheres on a floor, of spheres in a cloud and of lights (1, 2, 4, ...)
+    /// instead, and find the number from which a tree is faster than testing each one. An engine stops at the number where compiling takes seconds or its
     /// --time is used up
     #[arg(long, conflicts_with_all = ["report_table", "reference", "reference_spp", "cache", "seeds"])]
     pub scaling: bool,

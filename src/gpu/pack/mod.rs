@@ -1,10 +1,13 @@
 //! The scene packed for the device: storage buffers, or records for kernels with trees.
 
+mod trees;
+
+use crate::kernel::Access;
 use crate::kernel::layout::{DiskLight, LightCluster, Material, Surface, single};
 use crate::kernel::records::{RECORDS_A_ROW, Records};
-use crate::kernel::{Access, trees};
+use crate::kernel::trees::Parted;
+use crate::world::World;
 use crate::world::light_tree::{self, LightTree};
-use crate::world::{Node, Tree, World, visibility};
 
 /// What of a scene lies on the device, by how its kernel reaches it.
 #[derive(Debug, Clone)]
@@ -52,64 +55,6 @@ impl Buffers {
     }
 }
 
-/// Appends the trees of [`Access::Tree`], one after the other, as `shaders/tree/walk.wgsl` says.
-fn pack_trees(
-    records: &mut Vec<[u32; 4]>,
-    world: &World,
-    parted: &trees::Parted,
-    surfaces: &[Surface],
-) {
-    let blocks = visibility::blockers(world);
-    for group in &parted.groups {
-        debug_assert_eq!(records.len(), group.header);
-        let tree = Tree::new(&trees::boxes(world, group));
-        let root = &tree.nodes[1];
-        records.extend([root.sphere().map(f32::to_bits), [0; 4], [0; 4], [0; 4]]);
-        let number = |item: u32| group.numbers[item as usize];
-        let code = |item: u32| 2 * (number(item) as u32 + 1) + u32::from(blocks[number(item)]);
-        for k in 0..group.nodes() {
-            let below = |n: Node| -> [u32; 6] {
-                let [x, y, z] = n.min.map(f32::to_bits);
-                let [u, v, w] = n.max.map(f32::to_bits);
-                match n.item {
-                    Some(item) if group.spheres() => {
-                        let s = &surfaces[number(item)];
-                        let [x, y, z] = s.point.map(f32::to_bits);
-                        [x, y, z, s.radius.to_bits(), code(item), u32::MAX]
-                    }
-                    _ => [x, y, z, u, v, w],
-                }
-            };
-            let children = match (k, tree.nodes[k].item) {
-                (0, _) => [Node::EMPTY; 2],
-                // One alone.
-                (_, Some(_)) if group.spheres() && k == 1 => [*root, Node::EMPTY],
-                (_, Some(item)) if group.disks() => {
-                    let s = &surfaces[number(item)];
-                    let last = |[x, y, z]: [f32; 3], w: f32| [x, y, z, w].map(f32::to_bits);
-                    let (a, b) = (last(s.point, s.radius), last(s.axis, s.offset));
-                    records.extend([a, b, [code(item), s.faces[0], 0, u32::MAX], [0; 4]]);
-                    continue;
-                }
-                (_, Some(item)) => {
-                    records.extend([[code(item), 0, 0, 0], [0; 4], [0, 0, 0, u32::MAX], [0; 4]]);
-                    continue;
-                }
-                _ => [2 * k, 2 * k + 1].map(|c| *tree.nodes.get(c).unwrap_or(&Node::EMPTY)),
-            };
-            let [[a, b, c, d, e, f], [g, h, i, j, k, l]] = children.map(below);
-            let solid = |n: Node| {
-                n.item.filter(|_| group.solids()).map_or([0; 2], |item| {
-                    let s = &surfaces[number(item)];
-                    [s.solid, s.parent]
-                })
-            };
-            let [[m, n], [o, p]] = children.map(solid);
-            records.extend([[a, b, c, d], [e, f, g, h], [i, j, k, l], [m, n, o, p]]);
-        }
-    }
-}
-
 /// The light clusters of a world, and which lights are where, as `shaders/light/choose_by_tree.wgsl` says.
 fn pack_lights(world: &World) -> Vec<[u32; 4]> {
     let tree = LightTree::new(world);
@@ -146,12 +91,11 @@ fn pack_records(world: &World) -> Vec<[u32; 4]> {
         materials,
         lights,
     } = Buffers::new(world);
-    let parted = trees::Parted::new(world);
+    let parted = Parted::new(world);
     let at = Records::new(world, &parted);
     let row = RECORDS_A_ROW as usize;
-    let mut records = Vec::with_capacity(at.end.next_multiple_of(row));
-    pack_trees(&mut records, world, &parted, &surfaces);
-    debug_assert_eq!(records.len(), at.surfaces);
+    // Headers are filled in when their trees are built.
+    let mut records = vec![[0; 4]; at.surfaces];
     records.extend_from_slice(bytemuck::cast_slice(&surfaces));
     debug_assert_eq!(records.len(), at.materials);
     records.extend_from_slice(bytemuck::cast_slice(&materials));
@@ -161,7 +105,8 @@ fn pack_records(world: &World) -> Vec<[u32; 4]> {
     if light_tree::serves(world.lights.len()) {
         records.extend(pack_lights(world));
     }
-    debug_assert_eq!(records.len(), at.end);
+    records.resize(at.trees, [0; 4]);
+    trees::append(&mut records, world, &parted, &surfaces);
     if records.len() > row {
         records.resize(records.len().next_multiple_of(row), [0; 4]);
     }

@@ -1,0 +1,154 @@
+//! Trees as records: see `shaders/tree/walk.wgsl`.
+
+use crate::kernel::layout::{ShapeKind, Surface};
+use crate::kernel::trees::{Parted, UNIT, boxes};
+use crate::world::{Below, Box32, Tree, World, visibility};
+
+/// A node, a leaf or a header.
+type Unit = [[u32; 4]; UNIT];
+
+/// The highest bit of a node's marks. The same word of a leaf is a radius.
+const NODE: u32 = 1 << 31;
+
+/// Appends the trees of every group, and fills in the units before all records, of which the first is where walks end and the others
+/// are headers.
+pub(super) fn append(
+    records: &mut Vec<[u32; 4]>,
+    world: &World,
+    parted: &Parted,
+    surfaces: &[Surface],
+) {
+    put(records, 0, &node(&[], 0));
+    let blocks = visibility::blockers(world);
+    for group in &parted.groups {
+        let code = |number: usize| 2 * (number as u32 + 1) + u32::from(blocks[number]);
+        let boxes = boxes(world, group);
+        let mut header = group.header;
+        let trees = Tree::forest(&boxes);
+        for (k, tree) in trees.iter().enumerate() {
+            let root = records.len() / UNIT;
+            for n in &tree.nodes {
+                let unit = match n.below {
+                    Below::Item(item) => {
+                        let number = group.numbers[item as usize];
+                        leaf(group.function.shape, &surfaces[number], code(number))
+                    }
+                    Below::Nodes { first, count } => {
+                        let children = first as usize..(first + count) as usize;
+                        let boxes: Vec<Box32> =
+                            tree.nodes[children].iter().map(|n| n.bounds).collect();
+                        node(&boxes, root as u32 + first)
+                    }
+                };
+                records.extend(unit);
+            }
+            let next = if k + 1 < trees.len() {
+                records.extend([[0; 4]; UNIT]);
+                records.len() / UNIT - 1
+            } else {
+                0
+            };
+            let around = tree.nodes[0].bounds.sphere().map(f32::to_bits);
+            let links = [root as u32, next as u32, 0, 0];
+            put(records, header, &[around, links, [0; 4], [0; 4]]);
+            header = next;
+        }
+    }
+}
+
+fn put(records: &mut [[u32; 4]], unit: usize, what: &Unit) {
+    records[UNIT * unit..][..UNIT].copy_from_slice(what);
+}
+
+/// A surface, its item in the words that its kind does not need.
+fn leaf(shape: ShapeKind, s: &Surface, item: u32) -> Unit {
+    let with = |[x, y, z]: [f32; 3], w: f32| [x, y, z, w].map(f32::to_bits);
+    let (point, axis) = (with(s.point, s.radius), with(s.axis, s.offset));
+    let [x, y, z] = s.faces;
+    match shape {
+        ShapeKind::Sphere => [point, [item, s.solid, s.parent, 0], [0; 4], [0; 4]],
+        ShapeKind::Disk => [point, axis, [item, x, 0, 0], [0; 4]],
+        ShapeKind::Cylinder => {
+            let last = [s.top.to_bits(), s.solid, s.parent, item];
+            [point, axis, [x, y, z, 0], last]
+        }
+        ShapeKind::Plane | ShapeKind::HugeSphere => unreachable!("it has no bounds"),
+    }
+}
+
+/// A node with children in these boxes, at most four, which stand from unit `first` on.
+fn node(boxes: &[Box32], first: u32) -> Unit {
+    let [x, y, z] = [0, 1, 2].map(|k| {
+        let side = |b: &Box32| [b.min[k], b.max[k]];
+        Grid::new(&boxes.iter().map(side).collect::<Vec<_>>())
+    });
+    let origin = [&x, &y, &z].map(|g| g.origin.to_bits());
+    let exponents = x.exponent | y.exponent << 8 | z.exponent << 16;
+    let marks = exponents | (boxes.len() as u32) << 24 | NODE;
+    [
+        [origin[0], origin[1], origin[2], marks],
+        [x.low, y.low, z.low, x.high],
+        [y.high, z.high, first, 0],
+        [0; 4],
+    ]
+}
+
+/// The sides of boxes along one axis, in steps of a grid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Grid {
+    origin: f32,
+    /// Of the step, which is a power of two, as f32 has it.
+    exponent: u32,
+    /// A byte for each box, of the first in the lowest bits.
+    low: u32,
+    high: u32,
+}
+
+impl Grid {
+    /// The smallest grid for these sides, each the least and the greatest coordinate of a box. The coordinates on the grid lie outside
+    /// of them by at least the rounding errors of a walk, which takes the distances to the origin of the grid, and from there to a side.
+    ///
+    /// With M the greatest absolute coordinate, and o that of the ray's origin, the shader's rounding errors are below
+    /// 2⁻²⁴ (7 M + 3 |o|). The first part is made up for here, the second in `slabs_of`.
+    fn new(sides: &[[f32; 2]]) -> Self {
+        const STEPS: f64 = 255.0;
+        // The step 2⁻¹⁰⁰ is normal in f32, as must be its product with the inverse of a direction.
+        const LEAST_EXPONENT: u32 = 27;
+        const GREATEST_EXPONENT: u32 = 254;
+        // Subnormal numbers take a processor a hundred cycles a product, and are common: things stand on floors at 0.
+        const TINY: f32 = 1e-25;
+
+        let of = |k: usize| sides.iter().map(move |s| f64::from(s[k]));
+        let (least, greatest) = (
+            of(0).fold(f64::INFINITY, f64::min),
+            of(1).fold(f64::NEG_INFINITY, f64::max),
+        );
+        if least > greatest {
+            return Self {
+                origin: 0.0,
+                exponent: LEAST_EXPONENT,
+                low: 0,
+                high: 0,
+            };
+        }
+        let slack = 5e-7 * least.abs().max(greatest.abs());
+        let origin = ((least - slack) as f32).next_down();
+        let origin = if origin.abs() < TINY { -TINY } else { origin };
+        let from = |x: f64| x - f64::from(origin);
+        let step = |exponent: u32| f64::from(f32::from_bits(exponent << 23));
+        let exponent = (LEAST_EXPONENT..GREATEST_EXPONENT)
+            .find(|e| from(greatest + slack) <= STEPS * step(*e))
+            .unwrap_or(GREATEST_EXPONENT);
+        let bytes = |k: usize, on_grid: &dyn Fn(f64) -> f64| {
+            (0..).zip(of(k)).fold(0, |word, (i, x)| {
+                word | (on_grid(x).clamp(0.0, STEPS) as u32) << (8 * i)
+            })
+        };
+        Self {
+            origin,
+            exponent,
+            low: bytes(0, &|x| (from(x - slack) / step(exponent)).floor()),
+            high: bytes(1, &|x| (from(x + slack) / step(exponent)).ceil()),
+        }
+    }
+}
