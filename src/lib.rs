@@ -92,6 +92,9 @@ pub mod bench;
 pub mod cli;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
+pub mod export;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod log;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
@@ -99,6 +102,3 @@ pub mod plot;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod watch;
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub mod export;

@@ -341,8 +341,7 @@ impl<'a> Run<'a> {
         };
         let mut length = 1;
         if let Some(pace) = self.pace {
-            let fits = |seconds: f64, pixels: u64| (seconds / (pace * pixels as f64)) as u64;
-            length = fits(self.job.call.as_secs_f64(), self.widest);
+            length = (self.job.call.as_secs_f64() / (pace * self.widest as f64)) as u64;
             if let Some(time) = self.job.time {
                 // All tiles must have the same count when the time is used up.
                 let left = (time.as_secs_f64() - self.tally.seconds).max(0.0);

@@ -84,8 +84,14 @@ radius = 0.5
 radiance = [9, 8, 6]
 ";
 
-/// Each with what is in the box, and lines of it that are replaced.
-const CASES: [(&str, &str, &[(&str, &str)]); 18] = [
+/// A case: its name, what is in the box, and what is replaced in the text of the box.
+type Case = (
+    &'static str,
+    &'static str,
+    &'static [(&'static str, &'static str)],
+);
+
+const CASES: [Case; 18] = [
     (
         "glass and mirror balls",
         "[[sphere]]\ncenter = [-0.6, 0.5, 0]\nradius = 0.5\nmaterial = 'tinted'\n\

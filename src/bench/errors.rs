@@ -153,6 +153,7 @@ mod tests {
             covered: vec![true; n],
             noise: error.map(|e| Noise {
                 error: vec![[e; 4]; n],
+                luminance_alone: false,
                 samples: vec![8; n],
                 unit: crate::compare::Unit::Sample,
                 replicates: 4,

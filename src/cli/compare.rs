@@ -28,11 +28,12 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     }
     super::set_threads(args.talk.threads);
     let mut progress = Progress::new(&args.talk);
-    let mut read = |done: usize, paths: &[PathBuf]| {
+    let mut read = |done: usize, samples: Option<u64>| {
+        let paths = &sides[done];
         progress.step(done, STEPS, &paths[0].display().to_string());
-        Picture::read_renders(paths)
+        Picture::read_renders(paths, samples)
     };
-    let (a, b) = (read(0, &sides[0])?, read(1, &sides[1])?);
+    let (a, b) = (read(0, args.spp_a)?, read(1, args.spp_b)?);
     progress.step(2, STEPS, "comparing");
     let limits = Limits {
         alpha: args.alpha,

@@ -3,7 +3,9 @@
 use super::args::InfoArgs;
 use super::failure::Failure;
 use crate::film::coverage::Rect;
-use crate::output::{Kind, entries, read_exr, read_exr_header, read_png, read_png_header, store};
+use crate::output::{
+    Kind, entries, read_exr, read_exr_header, read_image, read_png, read_png_header, store,
+};
 use crate::stats::percent;
 use serde::Serialize;
 use std::path::Path;
@@ -12,7 +14,7 @@ use std::path::Path;
 #[derive(Serialize)]
 struct Info {
     file: String,
-    /// `film`, `EXR picture` or `PNG picture`.
+    /// `film`, `EXR picture`, `PNG picture` or `picture of another program`.
     kind: &'static str,
     /// Width and height of the whole picture in pixels.
     size: [u32; 2],
@@ -51,6 +53,7 @@ pub fn info(args: &InfoArgs) -> Result<(), Failure> {
         Kind::Film => of_film(&args.file)?,
         Kind::Exr => of_exr(&args.file)?,
         Kind::Png => of_png(&args.file)?,
+        Kind::Other => of_image(&args.file)?,
     };
     let text = if args.json {
         let json = serde_json::to_string_pretty(&info);
@@ -116,6 +119,17 @@ fn of_png(path: &Path) -> Result<Info, Failure> {
         film: None,
         channels: vec![header.channels],
         entries: header.texts,
+    })
+}
+
+fn of_image(path: &Path) -> Result<Info, Failure> {
+    Ok(Info {
+        file: path.display().to_string(),
+        kind: "picture of another program",
+        size: read_image(path)?.size,
+        film: None,
+        channels: Vec::new(),
+        entries: Vec::new(),
     })
 }
 

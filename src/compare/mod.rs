@@ -91,7 +91,8 @@ pub enum Incomparable {
     /// No verdict is possible, and there are no limits.
     #[error(
         "{name} does not state its noise (it has no error layers, no sample counts, or fewer than two replicates), so a \
-         limit is needed: use --max-flip or --max-relative-rmse"
+         limit is needed: use --max-flip or --max-relative-rmse. Pictures of other programs state it by several renders (--a, --b), \
+         or by variances with --spp-a or --spp-b"
     )]
     NoNoise {
         /// The picture without error layers.
@@ -161,6 +162,13 @@ fn check(a: &Picture, b: &Picture) -> Result<(), Incomparable> {
 fn notes(a: &Picture, b: &Picture) -> Vec<String> {
     let both = |key: &str| Some((a.origin(key)?, b.origin(key)?));
     let mut notes = Vec::new();
+    let alone = |p: &&Picture| p.noise.as_ref().is_some_and(|n| n.luminance_alone);
+    if let Some(picture) = [a, b].into_iter().find(alone) {
+        notes.push(format!(
+            "{} states the noise of its luminance alone: that is tested, and a change of colour without one of brightness is not seen",
+            picture.name
+        ));
+    }
     if let Some((x, y)) = both("scene_hash")
         && x != y
     {

@@ -1,9 +1,9 @@
-//! Pictures to compare: EXR files, films, PNG files, and films in memory.
+//! Pictures to compare: EXR files, films, other files, and films in memory.
 
 use crate::files::FileError;
 use crate::film::Film;
 use crate::output::store;
-use crate::output::{Kind, Pixels, entries, read_exr, read_png};
+use crate::output::{Kind, Pixels, entries, read_exr, read_image, read_png};
 use crate::provenance::Provenance;
 use std::path::Path;
 
@@ -29,6 +29,8 @@ pub struct Picture {
 pub struct Noise {
     /// Standard errors of R, G, B and of the luminance, row by row.
     pub error: Vec<[f64; 4]>,
+    /// Whether only the luminance's is known. Those of R, G and B are 0 then.
+    pub luminance_alone: bool,
     /// How often each pixel was measured.
     pub samples: Vec<u64>,
     /// What `samples` counts.
@@ -47,16 +49,23 @@ pub enum Unit {
 }
 
 impl Picture {
-    /// Reads a picture of any [`Kind`]. PNG files have no error layers.
+    /// Reads a picture of any [`Kind`]. Only films and EXR files state their noise.
     pub fn read(path: &Path) -> Result<Self, FileError> {
+        Self::read_sampled(path, None)
+    }
+
+    /// The same, where `samples` is the number of samples of a pixel. A picture that states variances, but does not say of how many
+    /// samples they are, has known noise only with it.
+    pub fn read_sampled(path: &Path, samples: Option<u64>) -> Result<Self, FileError> {
         match Kind::of(path)? {
-            Kind::Exr => Self::from_exr(path),
+            Kind::Exr => Self::from_exr(path, samples),
             Kind::Film => {
                 let (film, provenance) = store::load(path)?;
                 Self::from_film(path.display().to_string(), &film, &provenance)
                     .map_err(|why| FileError::content(path, why))
             }
             Kind::Png => Self::from_png(path),
+            Kind::Other => Self::from_image(path),
         }
     }
 
@@ -90,6 +99,7 @@ impl Picture {
             covered: estimates.iter().map(|e| e.samples > 0).collect(),
             noise: (provenance.replicates >= 2).then(|| Noise {
                 error: estimates.iter().map(|e| e.error).collect(),
+                luminance_alone: false,
                 samples: estimates.iter().map(|e| e.samples).collect(),
                 unit: Unit::Sample,
                 replicates: provenance.replicates,
@@ -102,7 +112,7 @@ impl Picture {
         picture.not_empty()
     }
 
-    fn from_exr(path: &Path) -> Result<Self, FileError> {
+    fn from_exr(path: &Path, samples: Option<u64>) -> Result<Self, FileError> {
         let exr = read_exr(path)?;
         let wrong = |why: String| FileError::content(path, why);
         let replicates = match exr.attributes.get("replicates") {
@@ -115,15 +125,34 @@ impl Picture {
         };
         let covered: Vec<bool> = match &exr.samples {
             Some(samples) => samples.iter().map(|&n| n > 0).collect(),
+            // Where another renderer's rays meet nothing is no gap.
+            None if exr.moments.is_some() => vec![true; exr.rgb.len()],
             None => exr.alpha.iter().map(|&a| a > 0.0).collect(),
         };
-        let noise = match (exr.error, exr.samples) {
-            (Some(error), Some(samples)) if replicates >= 2 => Some(Noise {
+        let noise = match (exr.error, exr.samples, exr.moments) {
+            (Some(error), Some(samples), _) if replicates >= 2 => Some(Noise {
                 error: error.iter().map(|e| e.map(f64::from)).collect(),
+                luminance_alone: false,
                 samples: samples.into_iter().map(u64::from).collect(),
                 unit: Unit::Sample,
                 replicates,
             }),
+            (None, _, Some(moments)) => {
+                // pbrt says how many, Mitsuba does not.
+                let told = exr.attributes.get("samplesPerPixel");
+                let told = told.and_then(|n| n.parse::<u64>().ok());
+                samples.or(told).filter(|n| *n >= 2).map(|samples| Noise {
+                    error: moments
+                        .errors(samples)
+                        .into_iter()
+                        .map(|e| [0.0, 0.0, 0.0, e])
+                        .collect(),
+                    luminance_alone: true,
+                    samples: vec![samples; exr.rgb.len()],
+                    unit: Unit::Sample,
+                    replicates: samples.try_into().unwrap_or(u32::MAX),
+                })
+            }
             _ => None,
         };
         let picture = Self {
@@ -146,6 +175,21 @@ impl Picture {
             covered: png.covered,
             noise: None,
             origin: png.texts,
+        };
+        picture
+            .not_empty()
+            .map_err(|why| FileError::content(path, why))
+    }
+
+    fn from_image(path: &Path) -> Result<Self, FileError> {
+        let image = read_image(path)?;
+        let picture = Self {
+            name: path.display().to_string(),
+            size: image.size,
+            rgb: image.rgb,
+            covered: image.covered,
+            noise: None,
+            origin: Vec::new(),
         };
         picture
             .not_empty()

@@ -6,13 +6,14 @@ use crate::stats::luminance;
 use std::path::{Path, PathBuf};
 
 impl Picture {
-    /// One picture, or the mean of several independent renders of the same scene, which states its error by their spread.
-    pub fn read_renders(paths: &[PathBuf]) -> Result<Self, FileError> {
+    /// One picture, or the mean of several independent renders of the same scene, which states its error by their spread. `samples` is
+    /// as for [`Picture::read_sampled`].
+    pub fn read_renders(paths: &[PathBuf], samples: Option<u64>) -> Result<Self, FileError> {
         let (first, others) = paths.split_first().expect("at least one path");
-        let mut sum = Self::read(first)?;
         if others.is_empty() {
-            return Ok(sum);
+            return Self::read_sampled(first, samples);
         }
+        let mut sum = Self::read(first)?;
         // The renders less the first one: their mean and squares don't lose digits.
         let base = sum.rgb.clone();
         let pixels = base.len();
@@ -49,6 +50,7 @@ impl Picture {
         sum.name = format!("{} and {} more", first.display(), others.len());
         sum.noise = Some(Noise {
             error,
+            luminance_alone: false,
             samples: vec![paths.len() as u64; pixels],
             unit: Unit::Render,
             replicates: paths.len() as u32,

@@ -4,7 +4,7 @@ use super::verdict::{Finding, Sensitivity, Verdict};
 use super::{Comparison, Metrics};
 use std::fmt::Write as _;
 
-pub(super) const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+pub(super) const CHANNELS: [&str; 4] = ["red", "green", "blue", "Y"];
 
 impl Comparison {
     /// The verdict in one sentence, and what the limits say besides.

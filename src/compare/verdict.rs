@@ -60,7 +60,7 @@ pub struct Finding {
     pub rect: Rect,
     /// Whether they are the whole picture.
     pub whole: bool,
-    /// 0, 1, 2: red, green, blue.
+    /// 0, 1, 2, 3: red, green, blue, luminance.
     pub channel: usize,
     /// Which test found it.
     pub kind: Kind,
@@ -113,7 +113,8 @@ impl Verdict {
 
 /// Tests two pictures of the same size, covered in the same pixels, which both state their noise.
 pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
-    let channels: Vec<Terms> = (0..3).map(|c| Terms::new(a, b, c)).collect();
+    let tested = channels(a, b);
+    let terms: Vec<Terms> = tested.iter().map(|&c| Terms::new(a, b, c)).collect();
     let sides = sides(a.size);
     let families: usize = sides.iter().map(|&side| kinds(side).len()).sum();
     let mut all = Vec::new();
@@ -122,12 +123,12 @@ pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
     for &side in sides.iter().rev() {
         let mut seen: Vec<f64> = Vec::new();
         for &kind in kinds(side) {
-            let grids = channels.iter().map(|t| t.grid(side, kind));
+            let grids = terms.iter().map(|t| t.grid(side, kind));
             let grids: Vec<Grid> = grids.collect();
             let count: usize = grids.iter().map(|g| g.blocks.len()).sum();
             tests += count;
             let share = (count * families) as f64;
-            for (channel, grid) in grids.iter().enumerate() {
+            for (&channel, grid) in tested.iter().zip(&grids) {
                 let found = grid.blocks.iter().filter_map(|block| {
                     let (p, z) = test(kind, block);
                     let p = (p * share).min(1.0);
@@ -165,6 +166,16 @@ pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
         tests,
         findings: pick(all, alpha),
         sensitivity,
+    }
+}
+
+/// The channels whose noise both pictures state: red, green and blue, or the luminance alone.
+fn channels(a: &Picture, b: &Picture) -> &'static [usize] {
+    let alone = |p: &Picture| p.noise.as_ref().is_some_and(|n| n.luminance_alone);
+    if alone(a) || alone(b) {
+        &[3]
+    } else {
+        &[0, 1, 2]
     }
 }
 

@@ -29,6 +29,12 @@ pub enum FileKind {
     Zip,
     /// A JPEG picture.
     Jpeg,
+    /// A TIFF picture.
+    Tiff,
+    /// A WebP picture.
+    Webp,
+    /// A Radiance HDR picture.
+    Hdr,
     /// What git-lfs leaves in place of a file that it has not fetched.
     LfsPointer,
     /// Text.
@@ -46,10 +52,34 @@ impl FileKind {
             [0x76, 0x2f, 0x31, 0x01, ..] => Some(Self::Exr),
             [b'P', b'K', 3, 4, ..] => Some(Self::Zip),
             [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
+            [b'I', b'I', 42, 0, ..] | [b'M', b'M', 0, 42, ..] => Some(Self::Tiff),
+            [
+                b'R',
+                b'I',
+                b'F',
+                b'F',
+                _,
+                _,
+                _,
+                _,
+                b'W',
+                b'E',
+                b'B',
+                b'P',
+                ..,
+            ] => Some(Self::Webp),
+            _ if start.starts_with(b"#?RADIANCE") || start.starts_with(b"#?RGBE") => {
+                Some(Self::Hdr)
+            }
             _ if start.starts_with(b"version https://git-lfs") => Some(Self::LfsPointer),
             _ if is_text(start) => Some(Self::Text),
             _ => None,
         }
+    }
+
+    /// Whether it is a picture of other programs, of the kinds that are only read.
+    pub fn is_other_picture(self) -> bool {
+        matches!(self, Self::Jpeg | Self::Tiff | Self::Webp | Self::Hdr)
     }
 
     /// The same for a file that should be text.
@@ -65,6 +95,9 @@ impl fmt::Display for FileKind {
             Self::Exr => "an EXR picture",
             Self::Zip => "a ZIP archive, such as a film",
             Self::Jpeg => "a JPEG picture",
+            Self::Tiff => "a TIFF picture",
+            Self::Webp => "a WebP picture",
+            Self::Hdr => "a Radiance HDR picture",
             Self::LfsPointer => "a git-lfs pointer; `git lfs pull` fetches the file itself",
             Self::Text => "text, such as a scene file",
             Self::Empty => "an empty file",
@@ -182,6 +215,10 @@ mod tests {
     fn kinds_are_known_by_their_first_bytes() {
         for (start, kind) in [
             (&b"\x89PNG\r\n\x1a\n"[..], Some(FileKind::Png)),
+            (b"II*\0\x08\0\0\0", Some(FileKind::Tiff)),
+            (b"MM\0*\0\0\0\x08", Some(FileKind::Tiff)),
+            (b"RIFF\x10\0\0\0WEBPVP8L", Some(FileKind::Webp)),
+            (b"#?RADIANCE\n", Some(FileKind::Hdr)),
             (b"\x76\x2f\x31\x01\x02", Some(FileKind::Exr)),
             (b"PK\x03\x04", Some(FileKind::Zip)),
             (b"\xff\xd8\xff\xe0", Some(FileKind::Jpeg)),

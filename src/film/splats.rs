@@ -188,7 +188,7 @@ impl Film {
             }
         }
         for rect in rects {
-            own.count(bounds, *rect, &[passes.clone()], strata);
+            own.count(bounds, *rect, std::slice::from_ref(&passes), strata);
             own.coverage.add(*rect, passes.clone());
         }
     }

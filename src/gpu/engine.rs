@@ -22,7 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// A submission aims to take this long: short for watchdogs and progress, long beside its overhead.
-const SUBMISSION_SECONDS: f64 = 0.1;
+pub(super) const SUBMISSION_SECONDS: f64 = 0.1;
 
 /// Paths of the first submission, when nothing has been measured: enough to keep an adapter busy, a software one and
 /// another, and soon done.
@@ -548,17 +548,9 @@ impl Engine for GpuEngine {
         };
         let mut splats = Vec::new();
         let (gpu, scene, seed) = (&self.gpu, &self.scene, self.seed);
-        let counters = light.trace(
-            gpu,
-            scene,
-            seed,
-            passes.clone(),
-            stop,
-            SUBMISSION_SECONDS,
-            |s| {
-                splats.push(s);
-            },
-        )?;
+        let counters = light.trace(gpu, scene, seed, passes.clone(), stop, |s| {
+            splats.push(s);
+        })?;
         film.put_passes(rects, passes, &splats);
         Ok(counters)
     }

@@ -1,6 +1,7 @@
 //! Traces light paths: the kernel of `shaders/light_path/trace.wgsl`, and the splats that it lists.
 
 use super::Gpu;
+use super::engine::SUBMISSION_SECONDS;
 use crate::engine::{Counters, EngineError};
 use crate::film::splats::{Splat, SplatSetup};
 use crate::kernel::layout::LightParams;
@@ -178,7 +179,6 @@ impl LightTracer {
         seed: u32,
         passes: Range<u64>,
         stop: &AtomicBool,
-        seconds: f64,
         mut take: impl FnMut(Splat),
     ) -> Result<Counters, EngineError> {
         let photons = u64::from(self.setup.paths);
@@ -209,7 +209,8 @@ impl LightTracer {
             self.batch_of(gpu, scene, params, &mut counters, &mut take)
                 .map_err(EngineError::Device)?;
             // A submission grows to what takes its time.
-            let fits = f64::from(paths) * seconds / begun.elapsed().as_secs_f64().max(1e-6);
+            let fits =
+                f64::from(paths) * SUBMISSION_SECONDS / begun.elapsed().as_secs_f64().max(1e-6);
             self.batch = fits.clamp(0.5 * self.batch, 4.0 * self.batch).max(1.0);
             at += u64::from(paths);
         }

@@ -1,5 +1,6 @@
 //! Reads OpenEXR pictures, written by this or another program.
 
+use super::exr_stated::Moments;
 use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
 use exr::error::Error;
@@ -34,6 +35,8 @@ pub struct Picture {
     pub error: Option<Vec<[f32; 4]>>,
     /// Samples of each pixel, if the file has them.
     pub samples: Option<Vec<u32>>,
+    /// What other renderers state in place of errors.
+    pub moments: Option<Moments>,
     /// Header attributes that are text or a number, as text.
     pub attributes: BTreeMap<String, String>,
 }
@@ -142,6 +145,7 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
         }
         None => None,
     };
+    let moments = moments(channels, size)?;
     let attributes = texts(&layer.attributes);
     Ok(Picture {
         size,
@@ -149,8 +153,40 @@ fn picture(layer: Layer<AnyChannels<FlatSamples>>) -> exr::error::Result<Picture
         alpha,
         error,
         samples,
+        moments,
         attributes,
     })
+}
+
+/// The spread of the luminance that Mitsuba or pbrt states, if one of them has written the picture.
+fn moments(
+    channels: &[AnyChannel<FlatSamples>],
+    size: [u32; 2],
+) -> exr::error::Result<Option<Moments>> {
+    let find = |name: &str| {
+        channels
+            .iter()
+            .find(|c| c.name.as_slice() == name.as_bytes())
+    };
+    let plane = |channel: &AnyChannel<FlatSamples>| -> exr::error::Result<Vec<f32>> {
+        let values = interleave([channel], size, f32::NEG_INFINITY)?;
+        Ok(values.into_iter().map(|[v]| v).collect())
+    };
+    if let [Some(_), Some(green), Some(_)] = ["Variance.R", "Variance.G", "Variance.B"].map(find) {
+        return Ok(Some(Moments::from_variance(&plane(green)?)));
+    }
+    // The integrator inside has a name of the user's.
+    for square in channels {
+        let name = utf8(&square.name);
+        let inner = name.strip_prefix("m2_").and_then(|n| n.strip_suffix(".Y"));
+        if let Some(inner) = inner
+            && let Some(mean) = find(&format!("{inner}.Y"))
+        {
+            let moments = Moments::from_means(&plane(mean)?, &plane(square)?);
+            return Ok(Some(moments));
+        }
+    }
+    Ok(None)
 }
 
 /// The attributes that are text or a number, as text.

@@ -2,6 +2,8 @@
 
 mod exr;
 mod exr_read;
+mod exr_stated;
+mod image_read;
 mod metadata;
 mod npz;
 pub mod pixels;
@@ -12,6 +14,8 @@ pub mod store;
 
 pub use exr::{CHANNELS, channel_values, write_exr};
 pub use exr_read::{ExrHeader, Picture, read_exr, read_exr_header};
+pub use exr_stated::Moments;
+pub use image_read::{Image, read_image};
 pub(crate) use metadata::entries;
 pub(crate) use pixels::Pixels;
 pub use png::write_png;
@@ -43,6 +47,8 @@ pub enum Kind {
     Exr,
     /// `.png`.
     Png,
+    /// `.hdr`, `.jpg`, `.tif`, `.webp`, which are read only.
+    Other,
 }
 
 impl Kind {
@@ -54,16 +60,18 @@ impl Kind {
             Some("exr") => return Ok(Self::Exr),
             Some("npz") => return Ok(Self::Film),
             Some("png") => return Ok(Self::Png),
+            Some("hdr" | "jpg" | "jpeg" | "tif" | "tiff" | "webp") => return Ok(Self::Other),
             _ => {}
         }
-        let mut start = [0; 4];
+        let mut start = [0; 12];
         let read = file.read_exact(&mut start);
         match FileKind::of(&start).filter(|_| read.is_ok()) {
             Some(FileKind::Zip) => Ok(Self::Film),
             Some(FileKind::Exr) => Ok(Self::Exr),
             Some(FileKind::Png) => Ok(Self::Png),
+            Some(kind) if kind.is_other_picture() => Ok(Self::Other),
             _ => {
-                let why = "not a picture that etendue reads (.exr, .png, or .npz film)";
+                let why = "not a picture that etendue reads (.exr, .png, .hdr, .jpg, .tif, .webp, or .npz film)";
                 let error = FileError::content(path, why);
                 Err(kind::explain(error, "a picture or a film", None))
             }

@@ -66,7 +66,9 @@ pub fn read_png(path: &Path) -> Result<Png, FileError> {
     });
     Ok(Png {
         size: [frame.width, frame.height],
-        rgb: rgb.map(|p| p.map(decode_srgb)).collect(),
+        rgb: rgb
+            .map(|p| p.map(|level| decode_srgb(f64::from(level) / 255.0)))
+            .collect(),
         covered: pixels
             .map(|p| !matches!(channels, 2 | 4) || p[channels - 1] > 0)
             .collect(),
@@ -99,9 +101,8 @@ fn texts(info: &Info) -> Vec<(String, String)> {
     latin1.chain(utf8).collect()
 }
 
-/// Linear value of an sRGB level: IEC 61966-2-1, both pieces of its curve.
-fn decode_srgb(level: u8) -> f64 {
-    let v = f64::from(level) / 255.0;
+/// Linear value of an sRGB value from 0 to 1: IEC 61966-2-1, both pieces of its curve.
+pub(super) fn decode_srgb(v: f64) -> f64 {
     if v <= 0.04045 {
         v / 12.92
     } else {

@@ -11,7 +11,8 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Pictures with error layers (films, and EXR files written by etendue) need no threshold: the test compares them up to their \
 noise, and --alpha is its false-alarm rate. Other pictures need a limit (--max-flip or --max-relative-rmse); noise then \
-counts as a difference. Several independent renders of each side state their noise by their spread.
+counts as a difference. Several independent renders of each side state their noise by their spread. Pictures of Mitsuba's \
+integrator `moment` and of pbrt's film `gbuffer` state the variance of their luminance.
 
 Examples:
   etendue compare before.exr after.exr
@@ -19,10 +20,12 @@ Examples:
   etendue compare before.png after.png --max-flip 0.05
   etendue compare --a old1.exr old2.exr old3.exr old4.exr --b new1.exr new2.exr new3.exr new4.exr
       four renders of each side, with four seeds, by any program
+  etendue compare ours.npz moments.exr --spp-b 256
+      a picture of Mitsuba's integrator `moment`, of 256 samples a pixel
 
 Exit status: 0 equal, 1 different, 2 not comparable, 4 a file can't be read or written.")]
 pub struct CompareArgs {
-    /// Reference picture: .exr, .png, or .npz (a film)
+    /// Reference picture: .exr, .png, .npz (a film); or .hdr, .jpg, .tif, .webp
     #[arg(required_unless_present = "renders_a", conflicts_with_all = ["renders_a", "renders_b"])]
     pub a: Option<PathBuf>,
     /// Picture to compare with it
@@ -34,6 +37,12 @@ pub struct CompareArgs {
     /// Independent renders to compare with it
     #[arg(long = "b", id = "renders_b", value_name = "FILE", num_args = 1.., requires = "renders_a")]
     pub renders_b: Vec<PathBuf>,
+    /// Samples per pixel of the reference, if it states variances without saying so
+    #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true)]
+    pub spp_a: Option<u64>,
+    /// Samples per pixel of the other picture, likewise
+    #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true)]
+    pub spp_b: Option<u64>,
     /// Probability that two pictures of the same scene are reported as different
     #[arg(long, value_name = "P", default_value_t = DEFAULT_ALPHA, value_parser = values::probability,
           allow_hyphen_values = true)]

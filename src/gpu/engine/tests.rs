@@ -204,7 +204,8 @@ fn a_call_with_several_parts_gives_the_bits_of_separate_calls() {
         let mut wanted = Film::new([16, 12], TILE, 2);
         let mut counted = Counters::default();
         for part in &alone {
-            let one = engine.render_parts(&mut wanted, part.rect, &[part.clone()], &stop);
+            let one =
+                engine.render_parts(&mut wanted, part.rect, std::slice::from_ref(part), &stop);
             counted += one.expect("samples");
         }
         // What is in the textures serves the next call; or it has gone, and comes from the film.
