@@ -153,15 +153,15 @@ fn in_buffer(module: &Module, f: &Function, mut pointer: Handle<Expression>) -> 
     }
 }
 
-/// Counts of the outermost loop of `render`, itself included.
-fn count(wgsl: &str) -> Counts {
+/// Counts of the outermost loop of the entry point with this name, itself included.
+fn count(wgsl: &str, entry_point: &str) -> Counts {
     let module =
         naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|e| panic!("{}", e.emit_to_string(wgsl)));
     let entry = module
         .entry_points
         .iter()
-        .find(|e| e.name == "render")
-        .expect("the kernel's entry point is render");
+        .find(|e| e.name == entry_point)
+        .expect("the kernel's entry point");
     let mut counter = Counter {
         module: &module,
         known: HashMap::new(),
@@ -179,7 +179,10 @@ fn count(wgsl: &str) -> Counts {
             counter.block(&entry.function, continuing, &mut counts);
         }
     }
-    assert!(loops > 0, "render has no loop at its outermost level");
+    assert!(
+        loops > 0,
+        "{entry_point} has no loop at its outermost level"
+    );
     counts
 }
 
@@ -192,8 +195,13 @@ fn now() -> BTreeMap<String, Counts> {
         let world = World::new(&scene, settings.size);
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         for access in [Access::Baked, Access::Buffers] {
-            let wgsl = compose(&world, &settings, Some(access)).wgsl;
-            all.insert(format!("{name}/{}", access.name()), count(&wgsl));
+            let kernel = compose(&world, &settings, Some(access));
+            let name = format!("{name}/{}", access.name());
+            if let Some(light) = &kernel.light {
+                let counts = count(&light.wgsl, "trace");
+                all.insert(format!("{name}/light"), counts);
+            }
+            all.insert(name, count(&kernel.wgsl, "render"));
         }
     }
     all
@@ -204,13 +212,13 @@ fn write(all: &BTreeMap<String, Counts>) -> String {
     let mut text = String::from(
         "# What the loop of each scene's kernel contains, calls replaced by what they call: see kernel_counts.rs.\n",
     );
-    text += &format!("{:25}", "kernel");
+    text += &format!("{:31}", "kernel");
     for (kind, w) in KINDS.iter().zip(width) {
         text += &format!("  {kind:>w$}");
     }
     text.push('\n');
     for (name, counts) in all {
-        text += &format!("{name:25}");
+        text += &format!("{name:31}");
         for (kind, w) in KINDS.iter().zip(width) {
             text += &format!("  {:>w$}", counts.get(kind).copied().unwrap_or(0));
         }

@@ -257,7 +257,6 @@ mod tests {
         for key in [
             "relative_error",
             "relative_error_uncertainty",
-            "light_paths",
             "mean_luminance",
             "paths_per_second",
             "rays_per_second",
