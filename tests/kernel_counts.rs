@@ -320,7 +320,7 @@ fn render() {
 
 #[test]
 fn a_small_kernel_is_counted_right() {
-    let counts = count(SMALL_KERNEL);
+    let counts = count(SMALL_KERNEL, "render");
     let of = |kind: &str| counts.get(kind).copied().unwrap_or(0);
     assert_eq!(of("loops"), 1);
     assert_eq!(
