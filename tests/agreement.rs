@@ -75,7 +75,7 @@ fn agree(s: &Scene) -> Result<(), Failed> {
         compare(
             "light paths against chance",
             &runs_with(s, 192, None, 0, true),
-            &runs_with(s, 2048, None, 100, false),
+            &runs_with(s, 1024, None, 100, false),
         )?;
     }
     compare(

@@ -274,3 +274,80 @@ fn only_the_requested_files_are_written() {
     bench.render("--spp 1 -o only.png");
     assert_eq!(bench.names(), ["box.toml", "only.png"]);
 }
+
+/// A lamp over a floor with a glass ball.
+const GLASS: &str = "
+[camera]
+eye = [0, 1, 3]
+look_at = [0, 0.5, 0]
+vfov = 45
+resolution = [40, 30]
+[material.white]
+type = 'diffuse'
+reflectance = [0.7, 0.7, 0.7]
+[material.glass]
+type = 'dielectric'
+ior = 1.5
+[[plane]]
+point = [0, 0, 0]
+normal = [0, 1, 0]
+material = 'white'
+[[sphere]]
+center = [0, 0.6, 0]
+radius = 0.5
+material = 'glass'
+[[light]]
+center = [0.5, 2.5, 0]
+normal = [0, -1, 0]
+radius = 0.3
+radiance = [20, 18, 15]
+";
+
+#[test]
+fn light_paths_bring_the_same_however_a_film_is_cut() {
+    let bench = Bench::new();
+    fs::write(bench.path("glass.toml"), GLASS).expect("a scene file");
+    let render =
+        |args: &str| bench.run(&format!("render glass.toml --backend gpu -o a.exr {args}"));
+    render("--spp 600 --film one.npz").success();
+    render("--spp 50 --film cut.npz").success();
+    render("--spp 600 --film cut.npz").success();
+    render("--samples 0..256 --film a.npz").success();
+    render("--samples 256..600 --film b.npz").success();
+    bench.run("merge slices.npz b.npz a.npz").success();
+    render("--spp 600 --region 0,0,40,11 --film upper.npz").success();
+    render("--spp 600 --region 0,11,40,30 --film lower.npz").success();
+    bench.run("merge regions.npz lower.npz upper.npz").success();
+    let one = bench.film("one.npz");
+    let of_one = one.splats().expect("light paths");
+    assert!(of_one.sums().iter().flatten().flatten().any(|s| *s > 0));
+    for name in ["cut", "slices", "regions"] {
+        let film = bench.film(&format!("{name}.npz"));
+        let splats = film.splats().expect("light paths");
+        assert!(splats.sums() == of_one.sums(), "{name}");
+        assert_eq!(splats.coverage.total(), of_one.coverage.total(), "{name}");
+    }
+    // Adaptive runs have as many passes as samples on average, whatever led there.
+    render("--adaptive --spp 100 --film once.npz").success();
+    render("--adaptive --spp 40 --film twice.npz").success();
+    render("--adaptive --spp 100 --film twice.npz").success();
+    assert!(bench.film("once.npz").splats() == bench.film("twice.npz").splats());
+
+    // What does not fit is refused, and says what to do.
+    render("--spp 601 --film one.npz --light-paths off")
+        .code(2)
+        .stderr(says("leave out --light-paths"));
+    bench
+        .run("render glass.toml --backend cpu --spp 601 --film one.npz -o a.exr")
+        .code(2)
+        .stderr(says("light paths, which the CPU reference does not trace"));
+    render("--spp 4 --light-paths off --film off.npz").success();
+    bench
+        .run("merge x.npz one.npz off.npz")
+        .code(2)
+        .stderr(says("light_paths is traced and off"));
+    bench
+        .run("info off.npz")
+        .success()
+        .stdout(says("light_paths                 off"));
+}
