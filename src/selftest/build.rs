@@ -131,6 +131,8 @@ impl Build {
         Settings {
             strata: 1,
             max_depth: 1500,
+            // The errors of measured values are those of independent samples, but one light path may reach many pixels.
+            light_paths: false,
             ..Settings::resolve(&self.0, &Overrides::default())
         }
     }

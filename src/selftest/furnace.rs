@@ -5,8 +5,11 @@ use super::Case;
 use super::backend::{Backend, Trouble};
 use super::build::{Build, GLASS, MIRROR, cylinder, grey, plane, sphere, v};
 use super::measure::{Measure, Tolerance};
+use crate::film::coverage::Rect;
+use crate::film::{BLOCK, Film};
 use crate::reference::Estimator;
 use crate::scene::{Bsdf, Shape};
+use crate::settings::Settings;
 use glam::DVec3;
 
 pub const CASES: &[Case] = &[
@@ -15,6 +18,12 @@ pub const CASES: &[Case] = &[
         name: "glass_sphere_in_dome",
         what: "a glass ball in the white dome: energy",
         run: glass_ball,
+    },
+    Case {
+        row: "8a",
+        name: "light_paths_in_dome",
+        what: "glass in the white dome, and the eye in it, with light paths: energy, and radiance that grows by n²",
+        run: light_paths,
     },
     Case {
         row: "9",
@@ -87,6 +96,38 @@ fn all_of_it(
 fn glass_ball(b: &Backend) -> Result<Vec<Measure>, Trouble> {
     let build = dome(EYE, MIDDLE, 40.0, &[(sphere(MIDDLE, 0.25), GLASS)]);
     all_of_it(b, "radiance", &build, 1.0)
+}
+
+/// The two cases around this one, with light paths where the backend has them.
+fn light_paths(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let ball = |eye, look_at, vfov| dome(eye, look_at, vfov, &[(sphere(MIDDLE, 0.25), GLASS)]);
+    let outside = ball(EYE, MIDDLE, 40.0);
+    let inside = ball(v(0.05, 0.45, 0.05), v(0.0, 0.35, 0.0), 60.0);
+    let mean = |build: &Build| -> Result<(f64, bool), Trouble> {
+        let settings = Settings {
+            light_paths: true,
+            ..build.settings()
+        };
+        let mut engine = b.engine(build, &settings)?;
+        let traced = engine.light_paths().is_some();
+        let rect = Rect::whole(settings.size);
+        let mut film = Film::new(settings.size, rect, settings.strata);
+        for block in 0..if traced { 16 } else { 1 } {
+            let samples = block * BLOCK..(block + 1) * BLOCK;
+            engine.render(&mut film, rect, samples, &b.stop_flag())?;
+        }
+        Ok((film.mean_luminance(), traced))
+    };
+    let mut measures = Vec::new();
+    for (what, build, expected) in [
+        ("eye outside", outside, 1.0),
+        ("eye inside", inside, 1.52 * 1.52),
+    ] {
+        let (mean, traced) = mean(&build)?;
+        let tolerance = Tolerance::Relative(if traced { 1e-3 } else { 1e-2 });
+        measures.push(Measure::new(what, mean, expected, tolerance));
+    }
+    Ok(measures)
 }
 
 fn eye_in_glass(b: &Backend) -> Result<Vec<Measure>, Trouble> {
