@@ -17,8 +17,8 @@ pub const MOST_FILMS: usize = 1000;
 /// The files that are watched.
 #[derive(Debug)]
 pub struct Files {
-    /// As they were named: films, and folders.
-    paths: Vec<PathBuf>,
+    /// As they were named, and whether each is a folder. A folder that goes does not become a film.
+    paths: Vec<(PathBuf, bool)>,
     /// The relative error to forecast, where a film's log does not say.
     error: Option<f64>,
     films: Vec<WatchedFilm>,
@@ -36,6 +36,8 @@ struct WatchedFilm {
     /// The versions of film and log that are on the board.
     seen: [Stamp; 2],
     outline: Option<Outline>,
+    /// Why the film can't be read as it is now.
+    problem: Option<String>,
     log: Option<Log>,
     /// Seconds, samples, relative error and its uncertainty, whenever the film was saved.
     curve: Vec<[f64; 4]>,
@@ -45,7 +47,13 @@ impl Files {
     /// Films and folders of films. `error`: see [`Files::error`].
     pub fn new(paths: Vec<PathBuf>, error: Option<f64>) -> Self {
         Self {
-            paths,
+            paths: paths
+                .into_iter()
+                .map(|path| {
+                    let is_folder = path.is_dir();
+                    (path, is_folder)
+                })
+                .collect(),
             error,
             films: Vec::new(),
             known: BTreeSet::new(),
@@ -55,8 +63,8 @@ impl Files {
 
     /// Puts on the board what has changed. Only the beginnings of files are read.
     pub fn poll(&mut self, board: &Board) {
-        for path in self.paths.clone() {
-            if path.is_dir() {
+        for (path, is_folder) in self.paths.clone() {
+            if is_folder {
                 films_in(&path).into_iter().for_each(|p| self.add(p, board));
             } else {
                 self.add(path, board);
@@ -84,6 +92,7 @@ impl Files {
             run,
             seen: [None, None],
             outline: None,
+            problem: None,
             log: None,
             curve: Vec::new(),
         });
@@ -111,10 +120,8 @@ impl WatchedFilm {
     fn poll(&mut self, error: Option<f64>, shelf: &Arc<Shelf>) {
         let log = self.path.with_extension("jsonl");
         let now = [stamp(&self.path), stamp(&log)];
-        if now == self.seen {
-            if now[0].is_none() {
-                self.run.problem(Some(self.missing().into()));
-            }
+        // A film that was never there is not news.
+        if now == self.seen && (now[0].is_some() || self.problem.is_some()) {
             return;
         }
         let [film_is_new, log_is_new] = [0, 1].map(|i| now[i] != self.seen[i]);
@@ -123,20 +130,22 @@ impl WatchedFilm {
             // Something else may have this name.
             self.log = now[1].and_then(|_| log::read(&log).ok());
         }
-        if film_is_new {
-            let Some((modified, _)) = now[0] else {
-                self.run.problem(Some(self.missing().into()));
-                return;
-            };
-            match store::outline(&self.path) {
-                Ok(outline) => self.take(outline, modified, shelf),
-                Err(e) => {
-                    self.run.problem(Some(e.message().into()));
-                    return;
+        match now[0] {
+            None => self.problem = Some(self.missing().into()),
+            Some((modified, _)) if film_is_new => match store::outline(&self.path) {
+                Ok(outline) => {
+                    self.problem = None;
+                    self.take(outline, modified, shelf);
                 }
-            }
+                Err(e) => self.problem = Some(e.message().into()),
+            },
+            Some(_) => {}
         }
         self.show(error);
+        // A log that goes on does not mend its film.
+        if self.problem.is_some() {
+            self.run.problem(self.problem.clone());
+        }
     }
 
     fn missing(&self) -> &'static str {
@@ -246,5 +255,67 @@ impl WatchedFilm {
             },
             ..Point::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::Film;
+    use crate::provenance::tests::example;
+    use crate::watch::board::Cursor;
+    use std::fs;
+
+    /// What the page says is wrong with each film, by its file's name.
+    fn problems(board: &Board) -> Vec<(String, String)> {
+        let of = |run: &Arc<Run>| {
+            let update = run.update(&mut Cursor::default()).expect("all is new");
+            let json = serde_json::to_value(update).unwrap();
+            let text = json["problem"].as_str().unwrap_or_default().to_owned();
+            (run.about().file, text)
+        };
+        board.runs().iter().map(of).collect()
+    }
+
+    #[test]
+    fn a_problem_stays_until_its_film_is_mended() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("night");
+        fs::create_dir(&folder).unwrap();
+        let (path, log) = (folder.join("a.npz"), folder.join("a.jsonl"));
+        let bounds = Rect::whole([2, 2]);
+        let mut film = Film::new([2, 2], bounds, 2);
+        film.put_samples(bounds, 0..16, vec![[[0.5, 0.5, 0.5, 0.25]; 4]; 4]);
+        store::save(&path, &film, &example([2, 2])).unwrap();
+        let board = Board::default();
+        let mut files = Files::new(vec![folder.clone()], None);
+        let mut now = || {
+            files.poll(&board);
+            problems(&board)
+        };
+        let said = |text: &str| vec![("a.npz".to_owned(), text.to_owned())];
+        assert_eq!(now(), said(""));
+
+        // Damaged; and its log goes on meanwhile.
+        let good = fs::read(&path).unwrap();
+        fs::write(&path, &good[..100]).unwrap();
+        let damaged = now();
+        assert!(damaged[0].1.contains("truncated"), "{damaged:?}");
+        fs::write(
+            &log,
+            "{\"event\":\"message\",\"level\":\"info\",\"text\":\"a\"}\n",
+        )
+        .unwrap();
+        assert_eq!(now(), damaged);
+        assert_eq!(now(), damaged);
+        fs::write(&path, &good).unwrap();
+        assert_eq!(now(), said(""));
+
+        // Gone, with its log and then with its folder, which is no film.
+        fs::remove_file(&path).unwrap();
+        assert_eq!(now(), said("the file is gone"));
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(now(), said("the file is gone"));
+        assert_eq!(now(), said("the file is gone"));
     }
 }
