@@ -65,7 +65,7 @@ fn unknown_keys_and_names_get_suggestions() {
         "[[disk]]",
         "[[discs]]",
         "54:3: unknown key \"discs\" in the scene; allowed: title, camera, render, material, sphere, \
-         spheres, plane, disk, cylinder, light, lights; did you mean \"disk\"?",
+         spheres, plane, disk, cylinder, cylinders, light, lights; did you mean \"disk\"?",
     );
     one(
         "ior = 1.5",
