@@ -20,7 +20,7 @@ pub const CASES: &[Case] = &[
         run: glass_ball,
     },
     Case {
-        row: "8a",
+        row: "L3",
         name: "light_paths_in_dome",
         what: "glass in the white dome, and the eye in it, with light paths: energy, and radiance that grows by n²",
         run: light_paths,
