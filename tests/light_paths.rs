@@ -341,7 +341,9 @@ fn replace(text: &mut String, old: &str, new: &str) {
 /// A case, a fault that it must show, and whether it is in the kernel of light paths, in the other one, or in both.
 type Fault = (&'static str, usize, [bool; 2], &'static str, &'static str);
 
-const FAULTS: [Fault; 6] = [
+/// A fault in the densities of lobes is not among them: it moves weight between two ways that both find the light, by less than the noise
+/// of these runs.
+const FAULTS: [Fault; 5] = [
     (
         "light counted twice",
         0,
@@ -369,13 +371,6 @@ const FAULTS: [Fault; 6] = [
         [true, true],
         "return photons * select(in_cone",
         "return 1.1 * photons * select(in_cone",
-    ),
-    (
-        "a lobe counts like a matt surface",
-        17,
-        [true, false],
-        "fmin(path.turned * cos_over_pdf_back(x, d, bsdf.pdf), 1.0e30)",
-        "PI",
     ),
     (
         "a pixel's cosine is forgotten",
