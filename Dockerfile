@@ -1,7 +1,7 @@
 # The program on Debian slim with a software Vulkan driver.
 #
 #     docker build -t etendue .
-#     docker run --rm -v "$PWD:/work" etendue render scene.toml
+#     docker run --rm -v "$PWD:/scenes" etendue render scene.toml
 FROM rust:1.95-slim-trixie AS build
 WORKDIR /source
 COPY . .
@@ -16,6 +16,6 @@ RUN apt-get update \
 COPY --from=build /source/target/dist/etendue /usr/local/bin/etendue
 # Where compiled kernels are kept: with --user there is no home.
 ENV XDG_CACHE_HOME=/tmp
-WORKDIR /work
+WORKDIR /scenes
 ENTRYPOINT ["etendue"]
 CMD ["--help"]

@@ -1,4 +1,4 @@
-//! `etendue regress --review`: shows what changed, old beside new, and asks before a golden is made anew.
+//! `etendue regress --review`: shows what changed, old beside new, and asks before it replaces a golden.
 
 use super::args::RegressArgs;
 use super::regress::{engine, lines, run_one, wanted};

@@ -178,7 +178,7 @@ mod tests {
         );
         assert_eq!(log.ended.as_deref(), Some("spp"));
         assert!(log.warnings.is_empty(), "those of the run before");
-        // Another picture begins anew.
+        // Another picture starts with nothing.
         let log = write(&[&lines[..], &[start("other", 0.0)]].concat(), "").unwrap();
         assert!(log.errors.is_empty() && log.ended.is_none());
         assert_eq!(write(&[], "").unwrap(), Log::default());

@@ -232,7 +232,7 @@ impl Run {
         self.changes.send_modify(|n| *n += 1);
     }
 
-    /// Begins anew: other facts, and an empty curve.
+    /// Starts over: other facts, and an empty curve.
     pub fn begin(&self, about: About) {
         self.change(|s| {
             s.about = about;
@@ -384,8 +384,8 @@ impl Run {
         if cursor.revision == s.revision {
             return None;
         }
-        let anew = cursor.epoch != s.epoch;
-        let (curve, messages) = if anew {
+        let starts_over = cursor.epoch != s.epoch;
+        let (curve, messages) = if starts_over {
             (0, 0)
         } else {
             (cursor.curve, cursor.messages)
@@ -398,7 +398,7 @@ impl Run {
         };
         Some(Update {
             id: self.id,
-            about: anew.then(|| s.about.clone()),
+            about: starts_over.then(|| s.about.clone()),
             now: s.now,
             curve: s.curve[curve..].to_vec(),
             messages: s.messages[messages..].to_vec(),
@@ -448,8 +448,9 @@ mod tests {
 
         // Another picture under the same name.
         run.begin(About::default());
-        let anew = run.update(&mut cursor).expect("news");
-        assert!(anew.about.is_some() && anew.curve.is_empty() && anew.messages.len() == 1);
+        let starts_over = run.update(&mut cursor).expect("news");
+        assert!(starts_over.about.is_some());
+        assert!(starts_over.curve.is_empty() && starts_over.messages.len() == 1);
     }
 
     #[test]
