@@ -68,7 +68,7 @@ struct PixelFilm {
     sum_1: vec4f,
     sum_2: vec4f,
     sum_3: vec4f,
-    // Rays; truncated paths, FURTHER, and in the upper half 1 + the place in its block of the first sample that was not finite; how many
+    // Rays; truncated paths, FURTHER, HIDDEN, FOUND, and in the upper half 1 + the place in its block of the first sample that was not finite; how many
     // such samples replicates 0 and 1 had, in a half each; and replicates 2 and 3.
     counts: vec4u,
     // The sample under way, the dispatch's first, and one past its last.
@@ -121,6 +121,14 @@ const FURTHER: u32 = 0x8000u;
 
 fn note_further(film: ptr<function, PixelFilm>, further: bool) {
     film.counts.y |= select(0u, FURTHER, further);
+}
+
+// The same behind mirrors or glass, where no light path can arrive; and such a path has found a light by way of mirrors or glass.
+const HIDDEN: u32 = 0x4000u;
+const FOUND: u32 = 0x2000u;
+
+fn note_hidden(film: ptr<function, PixelFilm>, further: bool, found: bool) {
+    film.counts.y |= select(0u, HIDDEN, further) | select(0u, FOUND, found);
 }
 
 fn count_truncated(film: ptr<function, PixelFilm>, truncated: bool) {

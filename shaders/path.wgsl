@@ -49,7 +49,9 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
 
         // A light ends the path.
         if meets_light & sees_lights(&path, sight) {
-            path.radiance += path.beta * emission(&path, hit) * share_of_light(&path, sight);
+            let light = path.beta * emission(&path, hit) * share_of_light(&path, sight);
+            path.radiance += light;
+            note_hidden(&film, false, is_hidden(&path) & path.specular & any(light > vec3f(0.0)));
         }
 
         // A surface sends it on, or ends it. Some surface there always is, whatever was met: lanes that met none go through the

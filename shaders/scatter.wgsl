@@ -14,6 +14,7 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
     let last = path.depth >= LAST_DEPTH;
     count_truncated(film, COUNT_TRUNCATED & last & wanted);
     note_further(film, meets & !path.all_specular);
+    note_hidden(film, meets & is_hidden(path), false);
     let goes_on = wanted & !last;
 
     // Direct light, where the surface scatters into more than one direction.

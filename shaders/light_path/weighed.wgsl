@@ -27,6 +27,11 @@ fn follow_trail(path: ptr<function, Path>, x: ptr<function, Interaction>, t: f32
     path.trail.by = select(path.trail.by, x.number, scattered.specular);
 }
 
+// Whether the path has scattered where no light path can arrive, for the eye sees that surface in mirrors or glass.
+fn is_hidden(path: ptr<function, Path>) -> bool {
+    return !path.all_specular & (path.trail.ratio == 0.0);
+}
+
 // The weight of a light that was met after mirrors or glass; 1 if no light path could have arrived here.
 fn share_of_chance(path: ptr<function, Path>, hit: Hit, light: DiskLight, index: u32) -> f32 {
     let aim = aim_of(path.trail.by);

@@ -133,7 +133,7 @@ pub(super) fn warn_of_doubt(error: &RelativeError) {
             "warning: no light found yet: the picture is black, and its error is not known; if the scene can show light at all \
              (see: etendue check), take more samples (--spp, --time)"
         ),
-        Some(doubt @ Doubt::Unlit(_)) => say!(
+        Some(doubt @ (Doubt::Unlit(_) | Doubt::Hidden(_))) => say!(
             "warning: {doubt}, so the true relative error may be far above the stated one; take more samples (--spp, --time)"
         ),
         Some(doubt @ Doubt::Uncertain) => say!(

@@ -54,6 +54,12 @@ const AROUND: usize = 4;
 /// The largest share of unlit pixels that counts as chance.
 const MOST_UNLIT: f64 = 0.01;
 
+/// If so many pixels have found light that mirrors and glass show, and that no light path brings, its error is known from them.
+const FEW_FOUND: f64 = 32.0;
+
+/// The radiance of such light over that of the brightest light, or a little less: a matt surface scatters it.
+const MATT: f64 = 0.25;
+
 /// An estimate of a picture's relative error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RelativeError {
@@ -73,6 +79,9 @@ pub enum Doubt {
     NoLight,
     /// In this share of the picture paths have met surfaces, but found no light.
     Unlit(f64),
+    /// In this share of the picture paths went on behind mirrors or glass, but hardly any has found light there by way of other mirrors
+    /// and glass.
+    Hidden(f64),
     /// The error rests on few bright samples, or on a single replicate.
     Uncertain,
 }
@@ -134,6 +143,11 @@ impl fmt::Display for Doubt {
             Self::Unlit(share) => write!(
                 f,
                 "no light found yet in {:.0} % of the picture",
+                (share * 100.0).max(1.0)
+            ),
+            Self::Hidden(share) => write!(
+                f,
+                "light that mirrors and glass show in {:.0} % of the picture was found too rarely",
                 (share * 100.0).max(1.0)
             ),
             Self::Uncertain => f.write_str("it rests on too few samples"),
@@ -241,8 +255,11 @@ impl Film {
             uncertainty = 1.0;
         }
         let unlit = self.unlit(&pixels) as f64 / count;
+        let [hidden, missing] = self.hidden(&pixels, mean, count);
         let doubt = if unlit > MOST_UNLIT {
             Some(Doubt::Unlit(unlit))
+        } else if missing > 2.0 * MOST_UNCERTAIN * value * value {
+            Some(Doubt::Hidden(hidden))
         } else {
             (single || by_rare_light > MOST_UNCERTAIN).then_some(Doubt::Uncertain)
         };
@@ -280,6 +297,31 @@ impl Film {
         pixels
     }
 
+    /// The share of pixels whose paths have gone on where no light path can arrive, and the squared relative error that may be missing
+    /// there, because hardly any path has found light by way of mirrors and glass.
+    fn hidden(&self, pixels: &[Light], mean: f64, count: f64) -> [f64; 2] {
+        let Some(splats) = &self.splats else {
+            return [0.0; 2];
+        };
+        let far = |least: Reach| {
+            let reached = pixels.iter().zip(&self.reached);
+            reached.filter(move |(_, r)| **r >= least as u8)
+        };
+        let samples: f64 = far(Reach::Hidden).map(|(p, _)| p.n).sum();
+        let found = far(Reach::Found).count() as f64;
+        if samples == 0.0 || found >= FEW_FOUND {
+            return [0.0; 2];
+        }
+        let pixels = far(Reach::Hidden).count() as f64;
+        // If so many were found, so many more may be expected at most, of 20 such pictures in 19.
+        let more = 3.0 + 2.0 * found.sqrt();
+        let chance = more / samples;
+        let light = MATT * splats.setup.scale;
+        let variance = chance * light * light * pixels / samples;
+        let share = pixels / count;
+        [share, share * variance / (mean * mean)]
+    }
+
     /// Pixels where paths have met surfaces beyond the first, but found no light, nor have the pixels around them.
     fn unlit(&self, pixels: &[Light]) -> u64 {
         if self.reached.is_empty() {
@@ -300,7 +342,7 @@ impl Film {
         let dark = |i: &usize| {
             let (x, y) = (i % width, i / width);
             pixels[*i].n > 0.0
-                && self.reached[*i] == Reach::Further as u8
+                && self.reached[*i] >= Reach::Further as u8
                 && !near(y, height).any(|y| along[y * width + x])
         };
         (0..lit.len()).into_par_iter().filter(dark).count() as u64

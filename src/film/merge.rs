@@ -117,11 +117,9 @@ pub fn merge(into: &mut Film, other: &Film) -> Result<(), MergeError> {
     if !other.reached.is_empty() {
         for y in other.bounds.y0..other.bounds.y1 {
             for x in other.bounds.x0..other.bounds.x1 {
-                match other.reached[other.index(x, y)] {
-                    0 => {}
-                    1 => into.reach(x, y, Reach::Surface),
-                    _ => into.reach(x, y, Reach::Further),
-                }
+                let how = other.reached[other.index(x, y)];
+                let known = Reach::ALL.into_iter().find(|r| *r as u8 == how);
+                known.into_iter().for_each(|r| into.reach(x, y, r));
             }
         }
     }

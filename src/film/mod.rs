@@ -68,6 +68,15 @@ pub enum Reach {
     Surface = 1,
     /// It has met another surface after it had scattered from one.
     Further = 2,
+    /// The same, where no light path can arrive: behind mirrors or glass, in a picture that has light paths.
+    Hidden = 3,
+    /// There, it has found a light by way of mirrors or glass.
+    Found = 4,
+}
+
+impl Reach {
+    /// Every one.
+    pub const ALL: [Self; 4] = [Self::Surface, Self::Further, Self::Hidden, Self::Found];
 }
 
 /// The estimate of a pixel.

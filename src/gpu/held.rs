@@ -52,6 +52,8 @@ pub(super) struct CountedRow {
 
 /// As in `shaders/film.wgsl`.
 const FURTHER: u32 = 0x8000;
+const HIDDEN: u32 = 0x4000;
+const FOUND: u32 = 0x2000;
 
 /// Unpacks the counters of some pixels, as `PixelFilm` of `shaders/film.wgsl` holds them, for `samples` of one block.
 pub(super) fn count_row(
@@ -68,12 +70,16 @@ pub(super) fn count_row(
     for (x, y, c) in pixels {
         let half = |k: usize, shift: u32| u64::from(c[k] >> shift & 0xffff);
         counters.rays += u64::from(c[0]);
-        if c[1] & FURTHER != 0 {
+        if c[1] & FOUND != 0 {
+            reached.push((x, y, Reach::Found));
+        } else if c[1] & HIDDEN != 0 {
+            reached.push((x, y, Reach::Hidden));
+        } else if c[1] & FURTHER != 0 {
             reached.push((x, y, Reach::Further));
         } else if u64::from(c[0]) > samples.end - samples.start {
             reached.push((x, y, Reach::Surface));
         }
-        counters.truncated += half(1, 0) & u64::from(FURTHER - 1);
+        counters.truncated += half(1, 0) & u64::from(FOUND - 1);
         let left_out = [half(2, 0), half(2, 16), half(3, 0), half(3, 16)];
         if left_out != [0; REPLICATES] {
             lost.push((x, y, left_out));

@@ -119,6 +119,8 @@ pub enum Doubt {
     NoLight,
     /// A part of the picture has found no light.
     Unlit,
+    /// Light that mirrors and glass show in a part of the picture was found too rarely.
+    Hidden,
     /// The error rests on few samples.
     Uncertain,
 }
@@ -129,6 +131,7 @@ impl From<crate::film::error::Doubt> for Doubt {
         match doubt {
             Of::NoLight => Self::NoLight,
             Of::Unlit(_) => Self::Unlit,
+            Of::Hidden(_) => Self::Hidden,
             Of::Uncertain => Self::Uncertain,
         }
     }

@@ -312,10 +312,8 @@ fn read<R: Read>(mut reader: Reader<R>) -> Result<(Film, Provenance), Damage> {
     };
     let reached = if header.reached {
         let reached: Vec<u8> = reader.array("reached", "|u1", &[height, width], pixels)?;
-        if reached.iter().any(|r| *r > Reach::Further as u8) {
-            return Err(Damage::Wrong(
-                "\"reached\" holds more than 0, 1 and 2".into(),
-            ));
+        if reached.iter().any(|r| *r > Reach::Found as u8) {
+            return Err(Damage::Wrong("\"reached\" holds more than 0 to 4".into()));
         }
         reached
     } else {

@@ -3,6 +3,7 @@
 use super::*;
 use crate::film::Sums;
 use crate::film::coverage::Rect;
+use crate::film::splats::SplatSetup;
 
 /// SplitMix64: uniform numbers from 0 to below 1.
 struct Uniform(u64);
@@ -215,6 +216,42 @@ fn surfaces_that_no_light_was_found_on_are_told_from_a_background() {
     let error = film.relative_error();
     assert_eq!(error.doubt, Some(Doubt::Unlit(share)));
     assert_eq!(error.upper(), None);
+}
+
+/// Mirrors and glass show surfaces in a corner of the picture. Light that comes there by way of mirrors and glass may be as bright as the
+/// lamp, and no light path brings it.
+#[test]
+fn light_that_mirrors_show_is_in_doubt_until_it_was_found() {
+    let even = |_, _| Source {
+        base: 0.9,
+        flash: 0.2,
+        chance: 0.5,
+    };
+    let doubt = |brightest: f64, hidden: u32, found: u32| {
+        let mut film = simulated(even, 1);
+        film.begin_splats(SplatSetup {
+            paths: 64,
+            scale: brightest,
+        });
+        film.put_passes(&[Rect::whole(SIZE)], 0..SAMPLES, &[]);
+        for k in 0..SIZE[0] * SIZE[1] {
+            let how = if k < found {
+                Reach::Found
+            } else if k < hidden {
+                Reach::Hidden
+            } else {
+                Reach::Further
+            };
+            film.reach(k % SIZE[0], k / SIZE[0], how);
+        }
+        film.relative_error().doubt
+    };
+    // E is 0.1 / 8. No sample of 100 x 64 has found light of 1/4 of 64, but 3 may. Then E would be larger by √(3 / 6400 x 16² / 64 x
+    // 100 / 1728), which is 1 / 96. With a lamp of 8 it is an eighth of that.
+    assert_eq!(doubt(64.0, 100, 0), Some(Doubt::Hidden(100.0 / PIXELS)));
+    assert_eq!(doubt(8.0, 100, 0), None);
+    assert_eq!(doubt(64.0, 0, 0), None, "nothing is hidden");
+    assert_eq!(doubt(64.0, 100, 40), None, "enough was found");
 }
 
 #[test]

@@ -39,6 +39,7 @@ function count(x) {
 const DOUBTS = {
   "no-light": "no light found yet",
   "unlit": "no light found yet in a part of the picture",
+  "hidden": "light that mirrors and glass show was found too rarely",
   "uncertain": "it rests on too few samples",
 };
 
