@@ -143,6 +143,8 @@ impl PictureArgs {
 Examples:
   etendue make-scene spheres --count 1000
       writes spheres.toml, and the spheres themselves to spheres.csv
+  etendue make-scene particles --count 500000
+      writes particles.toml, and the atoms to particles.xyz
   etendue make-scene lights --count 100 -o hall.toml")]
 pub struct MakeSceneArgs {
     /// Which objects the scene has many of
@@ -155,7 +157,7 @@ pub struct MakeSceneArgs {
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = values::seed(), allow_hyphen_values = true)]
     pub seed: u32,
     #[arg(help = format!("Scene file to write [default: the kind's name and .toml]. More than {MOST_IN_TABLES} objects go to a \
-                          .csv file beside it"))]
+                          .csv file beside it, and particles to an .xyz file"))]
     /// `--output`.
     #[arg(short, long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
@@ -212,6 +214,8 @@ pub enum SceneKind {
     Spheres,
     /// Equal spheres at random in a box over a floor.
     Cloud,
+    /// A ball of atoms, in an extended XYZ file.
+    Particles,
     /// Lamps in a hall of columns.
     Lights,
 }

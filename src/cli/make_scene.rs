@@ -9,16 +9,17 @@ use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Writes a scene with many objects, and the CSV file beside it if it needs one.
+/// Writes a scene with many objects, and the file of rows beside it if it needs one.
 pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
     type Make = fn(usize, u32, &str) -> generate::Generated;
-    let (default, make): (&str, Make) = match args.kind {
-        SceneKind::Spheres => ("spheres.toml", generate::spheres),
-        SceneKind::Cloud => ("cloud.toml", generate::cloud),
-        SceneKind::Lights => ("lights.toml", generate::lights),
+    let (default, extension, make): (&str, &str, Make) = match args.kind {
+        SceneKind::Spheres => ("spheres.toml", "csv", generate::spheres),
+        SceneKind::Cloud => ("cloud.toml", "csv", generate::cloud),
+        SceneKind::Particles => ("particles.toml", "xyz", generate::particles),
+        SceneKind::Lights => ("lights.toml", "csv", generate::lights),
     };
     let scene = args.output.clone().unwrap_or(default.into());
-    // The CSV file has the same stem: with the ending .csv the scene itself would be overwritten.
+    // The file of rows has the same stem: with its ending the scene itself would be overwritten.
     if !scene
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
@@ -28,7 +29,7 @@ pub fn make_scene(args: &MakeSceneArgs) -> Result<(), Failure> {
             "--output {scene}: the name of a scene must end in .toml"
         )));
     }
-    let rows = scene.with_extension("csv");
+    let rows = scene.with_extension(extension);
     let name = rows.file_name().unwrap_or_default().to_string_lossy();
     let made = make(args.count as usize, args.seed, &name);
     let rows = made.rows.as_ref().map(|text| (&rows, text));

@@ -1,10 +1,11 @@
 //! Defines what each table of a scene file contains. The parser uses these definitions to read a file, and the schema uses
 //! them to list the keys.
 
-use super::rows::RowKind;
+use super::rows::{ColorMap, Keys, Map, RowKind, Species, SpeciesLook, is_xyz};
+use super::source::quoted;
 use super::value::{
-    Angle, Count, Direction, LARGEST_STRATA, Point, Radiance, Radius, Resolution, SMALLEST, Text,
-    Value, normalized,
+    Angle, Count, Direction, Finite, LARGEST_STRATA, Point, Radiance, Radius, Resolution, SMALLEST,
+    Share, Text, Value, normalized,
 };
 use super::{Camera, DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Light, Place, RenderHints, Shape};
 use glam::DVec3;
@@ -24,6 +25,17 @@ pub(super) enum Found<T> {
     Wrong,
 }
 
+impl<T> Found<T> {
+    /// The value if there is one; none at all when it was wrong.
+    fn unless_wrong(self) -> Option<Option<T>> {
+        match self {
+            Self::Value(value) => Some(Some(value)),
+            Self::Absent => Some(None),
+            Self::Wrong => None,
+        }
+    }
+}
+
 /// A table that is being read or described.
 ///
 /// Functions over it ask for all their keys before they use any value, so that every error is
@@ -32,6 +44,16 @@ pub(super) trait Table {
     /// The value of `key`; its absence where it is required has been reported.
     fn find<T: Value>(&mut self, key: &'static str, need: Need<T>, about: &'static str)
     -> Found<T>;
+
+    /// The table `key` within this one, if it is there.
+    fn inner<T: Inner>(&mut self, key: &'static str, about: &'static str) -> Found<T>;
+
+    /// The tables within the table `key`, by name, if it is there.
+    fn inner_by_name<T: Inner>(
+        &mut self,
+        key: &'static str,
+        about: &'static str,
+    ) -> Found<Vec<(String, T)>>;
 
     /// Reports that the value of `key` breaks a rule that concerns more than it alone.
     fn refuse(&mut self, key: &str, message: String);
@@ -70,6 +92,15 @@ pub(super) trait Table {
             Found::Absent | Found::Wrong => None,
         }
     }
+}
+
+/// What a table within another one holds.
+pub(super) trait Inner: Sized {
+    /// What it is, for editors.
+    const ABOUT: &'static str;
+
+    /// The table; none when something was wrong, which has been reported.
+    fn read(t: &mut impl Table) -> Option<Self>;
 }
 
 /// `[camera]`.
@@ -242,25 +273,160 @@ fn cylinder(t: &mut impl Table) -> Option<Shape> {
     })
 }
 
-/// `[[spheres]]` or `[[cylinders]]`: the file of rows, and the name of their material if they have one in common.
-pub(super) fn surfaces(t: &mut impl Table, kind: RowKind) -> Option<(String, Option<String>)> {
+/// `[[spheres]]` or `[[cylinders]]`: the file of rows, and what the table says of all of them.
+pub(super) fn surfaces(t: &mut impl Table, kind: RowKind) -> Option<(String, Keys)> {
     let about = match kind {
         RowKind::Sphere => {
-            "CSV file whose first row names the columns: x, y, z, radius and, without the key material, material or r, g, b \
-             (the reflectance of a diffuse material). Its path is relative to the scene file."
+            "CSV file whose first row names the columns: x, y, z, and, unless keys say the same of all rows, radius and material or \
+             r, g, b (the reflectance of a diffuse material). Or an extended XYZ file, whose name ends in .xyz. Its path is \
+             relative to the scene file."
         }
         RowKind::Cylinder => {
-            "CSV file whose first row names the columns: x1, y1, z1, x2, y2, z2 (centres of both caps), radius and, without the \
-             key material, material or r, g, b (the reflectance of a diffuse material). Its path is relative to the scene file."
+            "CSV file whose first row names the columns: x1, y1, z1, x2, y2, z2 (centres of both caps), and, unless keys say the \
+             same of all rows, radius and material or r, g, b (the reflectance of a diffuse material). Its path is relative to the \
+             scene file."
         }
     };
     let file = t.required::<Text>("file", about);
-    let material = t.optional::<Text>(
-        "material",
-        None,
-        "NAME of a [material.NAME], for all rows of the file.",
-    );
-    Some((file?.0, material.map(|m| m.0)))
+    let about = "NAME of a [material.NAME], for all rows of the file.";
+    let material = t.optional::<Text>("material", None, about);
+    let radius = t.optional::<Radius>("radius", None, "Radius of all rows of the file.");
+    let color = t.inner::<ColorMap>("color", ColorMap::ABOUT);
+    let mut species = Found::Absent;
+    let mut frame = None;
+    if kind == RowKind::Sphere {
+        let about = "What the atoms of each species are drawn as; the file has a column species.";
+        species = t.inner_by_name::<Species>("species", about);
+        let about = "Number of the frame, from 0, of an XYZ file with several.";
+        frame = t.optional::<Count<0, { u32::MAX }>>("frame", None, about);
+    }
+    let keys = Keys {
+        material: material.map(|m| m.0),
+        radius: radius.map(|r| r.0),
+        species: species.unless_wrong()?,
+        color: color.unless_wrong()?,
+        frame: frame.map(|f| f.0),
+    };
+    let file = file?.0;
+    said_once(t, &keys)?;
+    let is_xyz = is_xyz(file.as_ref());
+    if is_xyz && kind == RowKind::Cylinder {
+        let message =
+            "an XYZ file holds points, which [[spheres]] draws; cylinders are read from CSV files";
+        t.refuse("file", message.into());
+        return None;
+    }
+    if frame.is_some() && !is_xyz {
+        t.refuse(
+            "frame",
+            "frame chooses among those of an .xyz file, and a CSV file has none".into(),
+        );
+        return None;
+    }
+    Some((file, keys))
+}
+
+/// Refuses two keys that say the same, and species of which only some say it.
+fn said_once(t: &mut impl Table, keys: &Keys) -> Option<()> {
+    let (radii, looks) = (keys.has_radii(), keys.has_looks());
+    let twice = [
+        (
+            keys.material.is_some() && keys.color.is_some(),
+            "color",
+            "material and color both say what the rows look like",
+        ),
+        (
+            keys.material.is_some() && looks,
+            "material",
+            "material and species both say what the rows look like",
+        ),
+        (
+            keys.color.is_some() && looks,
+            "color",
+            "color and species both say what the rows look like",
+        ),
+        (
+            keys.radius.is_some() && radii,
+            "radius",
+            "radius and species both say how large the rows are",
+        ),
+    ];
+    for (wrong, key, message) in twice {
+        if wrong {
+            t.refuse(key, format!("{message}; give one of them"));
+            return None;
+        }
+    }
+    for (name, species) in keys.species.iter().flatten() {
+        let lacks = [
+            (radii && species.radius.is_none(), "radius"),
+            (looks && species.look.is_none(), "reflectance or material"),
+        ];
+        if let Some((_, what)) = lacks.iter().find(|l| l.0) {
+            let name = quoted(name);
+            t.refuse(
+                "species",
+                format!("species {name} has no {what}, but others have"),
+            );
+            return None;
+        }
+    }
+    Some(())
+}
+
+impl Inner for Species {
+    const ABOUT: &'static str = "A species of atoms.";
+
+    fn read(t: &mut impl Table) -> Option<Self> {
+        let radius = t.optional::<Radius>("radius", None, "Radius.");
+        let about = "Reflectance of a diffuse material.";
+        let reflectance = t.optional::<Share>("reflectance", None, about);
+        let material = t.optional::<Text>("material", None, "NAME of a [material.NAME].");
+        let look = match (reflectance, material) {
+            (Some(_), Some(_)) => {
+                let message =
+                    "reflectance and material both say what a species looks like; give one of them";
+                t.refuse("material", message.into());
+                return None;
+            }
+            (Some(reflectance), None) => Some(SpeciesLook::Reflectance(reflectance.0)),
+            (None, Some(material)) => Some(SpeciesLook::Material(material.0)),
+            (None, None) => None,
+        };
+        let radius = radius.map(|r| r.0);
+        Some(Self { radius, look })
+    }
+}
+
+impl Inner for ColorMap {
+    const ABOUT: &'static str =
+        "Colours of the rows by the numbers of a column, as reflectances of diffuse materials.";
+
+    fn read(t: &mut impl Table) -> Option<Self> {
+        let about = "Name of the column; of a property of several columns, such as a velocity, the length is taken.";
+        let column = t.required::<Text>("column", about);
+        let map = t.required::<Map>("map", "Name of the colour map.");
+        let about = "The number that has the first colour, and all below it; the column's least if not given.";
+        let low = t.optional::<Finite>("low", None, about).map(|x| x.0);
+        let about = "The number that has the last colour, and all above it; the column's greatest if not given.";
+        let high = t.optional::<Finite>("high", None, about).map(|x| x.0);
+        if let (Some(low), Some(high)) = (low, high)
+            && low >= high
+        {
+            t.refuse(
+                "high",
+                format!("high is {high}, but must be above low, {low}"),
+            );
+            return None;
+        }
+        let (column, map) = (column?.0, map?);
+        Some(Self {
+            column,
+            map,
+            low,
+            high,
+        })
+    }
 }
 
 /// `[[lights]]`: the file of rows.

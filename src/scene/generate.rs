@@ -1,4 +1,5 @@
-//! Generates scenes with many objects: spheres placed like the seeds of a sunflower, a cloud of spheres, and a hall of lamps.
+//! Generates scenes with many objects: spheres placed like the seeds of a sunflower, a cloud of spheres, a cluster of atoms, and a
+//! hall of lamps.
 
 use super::parse::parse_with_rows;
 use super::{Diagnostic, Scene};
@@ -18,7 +19,7 @@ const GOLDEN: f64 = PI * (3.0 - 2.236_067_977_499_79);
 pub struct Generated {
     /// TOML.
     pub scene: String,
-    /// Comma-separated rows.
+    /// Rows of a CSV file, or of an extended XYZ file.
     pub rows: Option<String>,
 }
 
@@ -185,6 +186,83 @@ radiance = [9.0, 9.0, 9.0]
     list.finish(&mut scene, "spheres", rows)
 }
 
+/// A ball of `count` atoms in the places of a face-centred cubic crystal, with a core of gold, and an eighth cut away. `rows` names
+/// their extended XYZ file.
+pub fn particles(count: usize, seed: u32, rows: &str) -> Generated {
+    // Cells of four atoms along the radius of the ball, and some more.
+    let cells = (3.0 * count as f64 / (14.0 * PI)).cbrt();
+    let most = cells.ceil() as i32 + 2;
+    // In halves of a cell, whose corners and faces have an even sum. None of them lies on the cuts.
+    let mut places = Vec::new();
+    for x in -2 * most..2 * most {
+        for y in -2 * most..2 * most {
+            for z in -2 * most..2 * most {
+                let corner = [x, y, z].map(|k| f64::from(k) + 0.5);
+                if (x + y + z) % 2 == 0 && corner.iter().any(|k| *k < 0.0) {
+                    let square: f64 = corner.iter().map(|k| k * k).sum();
+                    places.push((square, corner));
+                }
+            }
+        }
+    }
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    places.truncate(count);
+    let last = places.last().map_or(1.0, |p| p.0.sqrt());
+    let half = 1.0 / (last + 0.7);
+    // Neighbours are √2 halves apart, and nearly touch.
+    let radius = 0.69 * half;
+    let mut text = format!("{count}\nProperties=species:S:1:pos:R:3:velo:R:3 pbc=\"F F F\"\n");
+    for (i, (square, corner)) in places.iter().enumerate() {
+        let [x, y, z] = corner.map(|k| k * half);
+        let is_core = square.sqrt() < 0.62 * last;
+        let species = if is_core { "Au" } else { "Cu" };
+        // It turns about the vertical, and is warm.
+        let warmth = [0, 1, 2].map(|k| 0.3 * (uniform(seed, i, k) - 0.5));
+        let [u, v, w] = [z + warmth[0], warmth[1], warmth[2] - x];
+        let _ = writeln!(
+            text,
+            "{species} {x:.6} {:.6} {z:.6} {u:.4} {v:.4} {w:.4}",
+            y + 1.0
+        );
+    }
+    let scene = format!(
+        "title = \"A ball of {count} atoms\"
+
+[camera]
+eye        = [2.2, 2.7, 2.9]
+look_at    = [0.0, 0.9, 0.0]
+vfov       = 36.0
+resolution = [512, 384]
+
+[material.floor]
+type        = \"diffuse\"
+reflectance = [0.6, 0.6, 0.6]
+
+[[plane]]
+point    = [0.0, -0.05, 0.0]
+normal   = [0.0, 1.0, 0.0]
+material = \"floor\"
+
+[[light]]
+center   = [2.5, 5.0, 1.0]
+normal   = [-2.5, -4.0, -1.0]
+radius   = 0.9
+radiance = [30.0, 28.0, 26.0]
+
+[[spheres]]
+file       = {rows:?}
+species.Au = {{ radius = {radius:.6}, reflectance = [0.8, 0.5, 0.12] }}
+species.Cu = {{ radius = {radius:.6}, reflectance = [0.45, 0.6, 0.75] }}
+# To colour them by speed, leave out both reflectances, and write:
+# color = {{ column = \"velo\", map = \"viridis\" }}
+"
+    );
+    Generated {
+        scene,
+        rows: Some(text),
+    }
+}
+
 /// A hall of columns under `count` lamps. `rows` names the file for them.
 pub fn lights(count: usize, seed: u32, rows: &str) -> Generated {
     let mut scene = format!(
@@ -311,6 +389,7 @@ impl List {
 mod tests {
     use super::*;
     use crate::provenance::hash::scene_hash;
+    use crate::scene::Shape;
     use crate::scene::check::lint;
     use crate::scene::parse::parse_str;
     use crate::settings::{Overrides, Settings};
@@ -325,6 +404,27 @@ mod tests {
                 let other: Vec<String> =
                     warnings.filter(|w| !w.contains("scene is open")).collect();
                 assert_eq!(other, [""; 0], "{count}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ball_of_atoms_has_just_so_many_and_none_meets_another() {
+        for count in [1, 2, 7, 100, 1000] {
+            let made = particles(count, 5, "x.xyz");
+            let scene = made.parse("x.toml".as_ref()).expect("a scene");
+            assert_eq!(scene.primitives.len(), count + 1);
+            let balls: Vec<_> = scene
+                .primitives
+                .iter()
+                .filter_map(|p| match p.shape {
+                    Shape::Sphere { center, radius } => Some((center, radius)),
+                    _ => None,
+                })
+                .collect();
+            for (i, (a, r)) in balls.iter().enumerate() {
+                assert!(a.y - r > -0.05, "above the floor");
+                assert!(balls[..i].iter().all(|(b, s)| a.distance(*b) > r + s));
             }
         }
     }

@@ -356,17 +356,9 @@ fn surfaces(
     materials: &[Named],
     palette: &mut Palette,
 ) -> Option<Vec<Primitive>> {
-    let (name, material) = format::surfaces(t, kind)?;
+    let (name, keys) = format::surfaces(t, kind)?;
     let find = |name: &str| find(name, materials);
-    let common = match material.as_deref().map(find) {
-        Some(Err(message)) => {
-            t.refuse("material", message);
-            return None;
-        }
-        Some(Ok(material)) => Some(material),
-        None => None,
-    };
     t.rows(&name, |path, text| {
-        rows::surfaces(path, text, place, kind, common, find, palette)
+        rows::surfaces(path, text, place, kind, &keys, find, palette)
     })
 }

@@ -1,7 +1,7 @@
 //! Reads the tables of a scene file key by key, and reports missing, invalid and unknown keys with their place.
 
-use super::format::{Found, Need, Table};
-use super::source::{Faults, Source, quoted, suggestion};
+use super::format::{Found, Inner, Need, Table};
+use super::source::{Faults, Source, quoted, shorten, suggestion};
 use super::value::{Text, Value};
 use super::{Bsdf, MaterialKind, Place, rows, schema};
 use std::borrow::Cow;
@@ -62,6 +62,47 @@ impl Table for Reader<'_, '_> {
         }
     }
 
+    fn inner<T: Inner>(&mut self, key: &'static str, _: &'static str) -> Found<T> {
+        self.known.push(key);
+        match self.table.get(key) {
+            Some(found) => self.inner_of(key, found),
+            None => Found::Absent,
+        }
+    }
+
+    fn inner_by_name<T: Inner>(
+        &mut self,
+        key: &'static str,
+        _: &'static str,
+    ) -> Found<Vec<(String, T)>> {
+        self.known.push(key);
+        let Some(found) = self.table.get(key) else {
+            return Found::Absent;
+        };
+        let DeValue::Table(all) = found.get_ref() else {
+            return self.no_table(key, found);
+        };
+        if all.is_empty() {
+            let message = format!("{key} is empty; it must have a table for each");
+            self.refuse(key, message);
+            return Found::Wrong;
+        }
+        let mut tables = Vec::with_capacity(all.len());
+        let mut whole = true;
+        for (name, value) in all {
+            let what = format!("{key}.{}", shorten(name.get_ref()));
+            match self.inner_of(&what, value) {
+                Found::Value(table) => tables.push((name.get_ref().to_string(), table)),
+                Found::Absent | Found::Wrong => whole = false,
+            }
+        }
+        if whole {
+            Found::Value(tables)
+        } else {
+            Found::Wrong
+        }
+    }
+
     fn refuse(&mut self, key: &str, message: String) {
         let place = self.place_of(key);
         self.faults.push(place, message);
@@ -86,7 +127,24 @@ impl<'a, 't> Reader<'a, 't> {
         }
     }
 
-    /// The result of `read` for the CSV file `name`, a path relative to the scene file.
+    /// The table `found`, which is `name` within this one.
+    fn inner_of<T: Inner>(&mut self, name: &str, found: &Spanned<DeValue<'t>>) -> Found<T> {
+        let DeValue::Table(table) = found.get_ref() else {
+            return self.no_table(name, found);
+        };
+        let what = format!("{name} of {}", self.what);
+        let mut inner = Reader::new(self.source, self.faults, &what, Some(found.span()), table);
+        inner.read_all(T::read).map_or(Found::Wrong, Found::Value)
+    }
+
+    fn no_table<T>(&mut self, name: &str, found: &Spanned<DeValue>) -> Found<T> {
+        let value = self.source.quote(found.span());
+        let message = format!("{name} is {value}, but must be a table");
+        self.faults.push(Some(found.span().start), message);
+        Found::Wrong
+    }
+
+    /// The result of `read` for the file of rows `name`, a path relative to the scene file.
     pub(super) fn rows<T>(
         &mut self,
         name: &str,
@@ -107,6 +165,10 @@ impl<'a, 't> Reader<'a, 't> {
             }
             Err(rows::Wrong::Content(errors)) => {
                 self.faults.push_elsewhere(errors);
+                None
+            }
+            Err(rows::Wrong::Key(key, message)) => {
+                self.refuse(key, message);
                 None
             }
         }

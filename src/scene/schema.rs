@@ -1,6 +1,6 @@
 //! JSON Schema of scene files, for completion, hover texts and error checking in editors.
 
-use super::format::{self, Found, Need, ShapeKind, Table};
+use super::format::{self, Found, Inner, Need, ShapeKind, Table};
 use super::rows::RowKind;
 use super::value::{Text, Value};
 use super::{MaterialKind, Place};
@@ -36,7 +36,7 @@ pub fn schema() -> Json {
         properties.insert(kind.name().into(), json!({"type": "array", "items": table}));
     }
     for (kind, about) in [
-        (RowKind::Sphere, "Spheres from a CSV file."),
+        (RowKind::Sphere, "Spheres from a CSV or XYZ file."),
         (RowKind::Cylinder, "Cylinders from a CSV file."),
     ] {
         let table = describe(about, |t| format::surfaces(t, kind));
@@ -126,6 +126,22 @@ impl Table for Description {
             Need::Optional(None) => {}
         }
         self.properties.insert(key.into(), schema);
+        Found::Absent
+    }
+
+    fn inner<T: Inner>(&mut self, key: &'static str, about: &'static str) -> Found<T> {
+        self.properties.insert(key.into(), describe(about, T::read));
+        Found::Absent
+    }
+
+    fn inner_by_name<T: Inner>(
+        &mut self,
+        key: &'static str,
+        about: &'static str,
+    ) -> Found<Vec<(String, T)>> {
+        let each = describe(T::ABOUT, T::read);
+        let all = json!({"description": about, "type": "object", "additionalProperties": each, "minProperties": 1});
+        self.properties.insert(key.into(), all);
         Found::Absent
     }
 

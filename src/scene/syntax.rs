@@ -134,6 +134,8 @@ fn hint(text: &str, message: &str, span: &Range<usize>) -> &'static str {
     }
     if found.starts_with('(') {
         "; lists stand in brackets: [1.0, 2.0]"
+    } else if is_sum(found) {
+        "; nothing is calculated here: write the result"
     } else if found.ends_with(';') {
         "; lines end without a semicolon"
     } else if found.starts_with(['\u{201c}', '\u{201d}', '\u{2018}', '\u{2019}']) {
@@ -141,6 +143,15 @@ fn hint(text: &str, message: &str, span: &Range<usize>) -> &'static str {
     } else {
         ""
     }
+}
+
+/// Whether it is a formula: numbers with signs between them, such as `90/2` or `2 * pi`.
+fn is_sum(found: &str) -> bool {
+    let of_formulas = |c: char| c.is_ascii_alphanumeric() || "+-*/^(). ".contains(c);
+    found.starts_with(|c: char| c.is_ascii_digit() || "+-.(".contains(c) || c.is_ascii_lowercase())
+        && found.chars().all(of_formulas)
+        && found.contains(|c: char| c.is_ascii_digit())
+        && found[1..].contains(['+', '*', '/', '^'])
 }
 
 fn is_unquoted(message: &str) -> bool {

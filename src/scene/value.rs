@@ -1,5 +1,6 @@
 //! The kinds of value in scene files. Each kind parses its values, states its rule, and describes itself as JSON Schema.
 
+use super::rows::{MAPS, Map};
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 use std::ops::Range;
@@ -96,7 +97,9 @@ impl Interval {
 
     fn rule(&self) -> String {
         let Self { low, high, why, .. } = self;
-        if self.open {
+        if self.high == f64::MAX {
+            "that is finite".into()
+        } else if self.open {
             format!("above {low} and below {high}{why}")
         } else {
             format!("from {} to {}{why}", brief(*low), brief(*high))
@@ -261,6 +264,8 @@ numbers! {
     Ior: one of IOR;
     /// A Phong exponent.
     Exponent: one of EXPONENT;
+    /// Any finite number.
+    Finite: one of FINITE;
 }
 
 numbers! {
@@ -351,6 +356,27 @@ impl<const LOW: u32, const HIGH: u32> Value for Count<LOW, HIGH> {
 
     fn to_json(&self) -> Json {
         json!(self.0)
+    }
+}
+
+impl Value for Map {
+    fn rule() -> String {
+        let names = MAPS.map(|m| m.0).join(", ");
+        format!("the name of a colour map: {names}")
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        let name = found.get_ref().as_str();
+        let map = MAPS.iter().position(|m| Some(m.0) == name);
+        map.map(Self).ok_or_else(|| wrong(found))
+    }
+
+    fn schema() -> Json {
+        json!({"enum": MAPS.map(|m| m.0)})
+    }
+
+    fn to_json(&self) -> Json {
+        json!(MAPS[self.0].0)
     }
 }
 

@@ -288,8 +288,9 @@ fn what_was_meant_is_said() {
         (
             "vfov = 42",
             "vfov = 90/2",
-            "expected a number, a list, or a text in quotes; found `90/2`",
+            "found `90/2`; nothing is calculated here: write the result",
         ),
+        ("vfov = 42", "vfov = 2 * 21.0", "nothing is calculated here"),
         (
             "[0.0, 1.0, 3.8]",
             "(0.0, 1.0, 3.8)",
@@ -350,4 +351,69 @@ fn messages_are_short_lines_whatever_the_file_holds() {
             assert!(error.chars().count() < 400, "{error}");
         }
     }
+}
+
+/// Of the tables within a table that reads rows.
+#[test]
+fn what_rows_look_like_is_said_once() {
+    for (keys, message) in [
+        (
+            "material = 'white'\ncolor = { column = 'q', map = 'viridis' }",
+            "81:9: material and color both say what the rows look like; give one of them",
+        ),
+        (
+            "color = { column = 'q', map = 'viridi' }",
+            "80:31: map is 'viridi'; map must be the name of a colour map: viridis, plasma,",
+        ),
+        (
+            "color = { colum = 'q', map = 'viridis' }",
+            "80:9: missing key column in color of [[spheres]]; it must be a string",
+        ),
+        (
+            "color = { column = 'q', map = 'reds', low = 2, high = 1.5 }",
+            "80:55: high is 1.5, but must be above low, 2",
+        ),
+        (
+            "color = 'viridis'",
+            "80:9: color is 'viridis', but must be a table",
+        ),
+        (
+            "species.O = { radius = 0 }",
+            "80:24: radius is 0; radius must be a number from 1e-15 to 1e15",
+        ),
+        (
+            "species.O = 'red'",
+            "80:13: species.O is 'red', but must be a table",
+        ),
+        ("species = {}", "80:11: species is empty"),
+        (
+            "species.O = { radius = 1, material = 'white', reflectance = [1, 0, 0] }",
+            "80:38: reflectance and material both say what a species looks like",
+        ),
+        (
+            "species.O = { radius = 1 }\nspecies.H = { reflectance = [1, 1, 1] }",
+            "80:",
+        ),
+        (
+            "radius = 2\nspecies.O = { radius = 1 }",
+            "80:10: radius and species both say how large the rows are",
+        ),
+        (
+            "frame = 2",
+            "80:9: frame chooses among those of an .xyz file",
+        ),
+    ] {
+        let text = format!("{FULL}[[spheres]]\nfile = 'none.csv'\n{keys}\n");
+        let found = parse(&text).expect_err(keys);
+        let is_there = found
+            .iter()
+            .any(|e| e.starts_with(&format!("s.toml:{message}")));
+        assert!(is_there, "{keys}: {found:?}");
+    }
+    let text = format!("{FULL}[[cylinders]]\nfile = 'none.xyz'\nmaterial = 'white'\n");
+    let found = parse(&text).expect_err("no points");
+    assert!(
+        found[0].contains("an XYZ file holds points, which [[spheres]] draws"),
+        "{found:?}"
+    );
 }
