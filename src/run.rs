@@ -77,6 +77,8 @@ pub struct Tally {
     pub complete: bool,
     /// If the error can end the run: the error at the last check, and the samples per pixel at that time.
     pub error: Option<(u64, RelativeError)>,
+    /// The tile that has got samples last.
+    pub tile: Option<Rect>,
     /// The expected end, by the stop condition that will be met first; `None` while it is unknown.
     pub forecast: Option<Forecast>,
 }
@@ -300,6 +302,7 @@ impl<'a> Run<'a> {
     fn call(&mut self, tile: Rect, parts: &[Part]) -> Result<bool, EngineError> {
         let done = self.call_on(None, tile, parts)?;
         if done {
+            self.tally.tile = Some(tile);
             self.tally.samples += paths(parts) / self.pixels as f64;
             self.tally.complete = self.tally.complete || is_complete(&self.film.coverage, self.job);
             self.first

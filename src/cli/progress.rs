@@ -98,6 +98,7 @@ pub fn point(tally: &Tally) -> Point {
         fraction: tally.forecast.map(|f| f.fraction),
         paths,
         paths_per_second: (tally.seconds > 0.0).then(|| paths as f64 / tally.seconds),
+        tile: tally.tile.map(|t| [t.x0, t.y0, t.x1, t.y1]),
         ..Point::default()
     }
 }

@@ -87,6 +87,9 @@ pub struct Point {
     pub paths: u64,
     /// Over the rendering time.
     pub paths_per_second: Option<f64>,
+    /// The tile that has got samples last: x0, y0, x1, y1.
+    #[serde(default)]
+    pub tile: Option<[u32; 4]>,
     /// The picture's error when it was last computed.
     #[serde(flatten)]
     pub error: Measured,
@@ -222,7 +225,7 @@ mod tests {
         let value: serde_json::Value = serde_json::from_str(&line).unwrap();
         let expected = json!({
             "event": "progress", "samples": 12.0, "seconds": 3.5, "fraction": null, "seconds_left": null,
-            "paths": 96, "paths_per_second": null, "relative_error": null, "relative_error_uncertainty": null,
+            "paths": 96, "paths_per_second": null, "tile": null, "relative_error": null, "relative_error_uncertainty": null,
             "relative_error_doubt": null, "relative_error_samples": null, "relative_error_seconds": null,
         });
         assert_eq!(value, expected);

@@ -22,10 +22,13 @@ impl Query<'_> {
         self.get(key)?.parse().ok()
     }
 
-    /// A number that is no more than 100.
-    pub fn number(&self, key: &str) -> Option<f64> {
-        let number: f64 = self.get(key)?.parse().ok()?;
-        (number.abs() <= 100.0).then_some(number)
+    /// An exposure in powers of two, from -100 to 100; 0 if nothing is said, and `None` if it is something else.
+    pub fn exposure(&self) -> Option<f64> {
+        let Some(text) = self.get("exposure") else {
+            return Some(0.0);
+        };
+        let stops: f64 = text.parse().ok()?;
+        (stops.abs() <= 100.0).then_some(stops)
     }
 
     /// The whole picture if nothing is said; `k` as large as it takes. `None` if it is not within the picture.

@@ -149,10 +149,13 @@ impl Site {
                     (Some(run), ["pixel"]) => self.pixel(run, query).await,
                     (Some(run), ["about"]) => about(&run),
                     (Some(run), ["picture.exr"]) => self.download(run, Download::Exr).await,
-                    (Some(run), ["picture.png"]) => {
-                        let stops = query.number("exposure").unwrap_or(0.0);
-                        self.download(run, Download::Png(stops)).await
-                    }
+                    (Some(run), ["picture.png"]) => match query.exposure() {
+                        Some(stops) => self.download(run, Download::Png(stops)).await,
+                        None => plain(
+                            StatusCode::BAD_REQUEST,
+                            "expected an exposure from -100 to 100",
+                        ),
+                    },
                     (Some(run), ["film.npz"]) => self.download(run, Download::Film).await,
                     _ => not_found(),
                 }

@@ -174,7 +174,7 @@ fn the_picture_grows_in_a_browser() {
         json!({"url": format!("http://{}/", running.at)}),
     );
     until("picture", || {
-        let drawn = browser.eval("typeof view === 'object' && view.whole !== null");
+        let drawn = browser.eval("typeof view === 'object' && Boolean(view.whole)");
         (drawn == true).then_some(())
     });
     let (first, samples) = (browser.canvas(), browser.text("samples"));
@@ -272,6 +272,116 @@ fn the_picture_grows_in_a_browser() {
     assert_eq!(browser.complaints, [""; 0]);
 }
 
+/// What is seen of the picture: the point in the middle, and screen pixels of one of its own.
+fn seen(browser: &mut Browser) -> [f64; 3] {
+    let seen = browser.eval("[...view.center, view.zoomed]");
+    [0, 1, 2].map(|k| seen[k].as_f64().expect("a number"))
+}
+
+#[test]
+fn mouse_and_fingers_move_the_picture() {
+    let bench = Bench::new();
+    let Some(mut browser) = Browser::open() else {
+        return;
+    };
+    // Of several tiles.
+    let running = Running::endless(&bench, "--size 512x384");
+    browser.window(1280, 900, false);
+    browser.call(
+        "Emulation.setTouchEmulationEnabled",
+        json!({"enabled": true, "maxTouchPoints": 2}),
+    );
+    let address = json!({"url": format!("http://{}/", running.at)});
+    browser.call("Page.navigate", address);
+    until("picture", || {
+        (browser.eval("typeof view === 'object' && Boolean(view.whole)") == true).then_some(())
+    });
+    let middle = browser.eval(
+        "(() => { const b = view.canvas.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()",
+    );
+    let [x, y] = [0, 1].map(|k| middle[k].as_f64().expect("a number"));
+    let mouse = |browser: &mut Browser, kind: &str, dx: f64, dy: f64, buttons: u32| {
+        let event = json!({"type": kind, "x": x + dx, "y": y + dy, "button": "left", "buttons": buttons, "clickCount": 1});
+        browser.call("Input.dispatchMouseEvent", event);
+    };
+    // The wheel zooms in, about the pointer.
+    let whole = seen(&mut browser);
+    let wheel = json!({"type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": -500});
+    browser.call("Input.dispatchMouseEvent", wheel);
+    until("zoom", || {
+        let now = seen(&mut browser);
+        (now[2] > 3.9 * whole[2] && (now[0] - whole[0]).abs() < 1.0).then_some(())
+    });
+    // What is dragged stays under the pointer.
+    let before = seen(&mut browser);
+    mouse(&mut browser, "mousePressed", 0.0, 0.0, 1);
+    mouse(&mut browser, "mouseMoved", 40.0, -20.0, 1);
+    mouse(&mut browser, "mouseReleased", 40.0, -20.0, 0);
+    let now = seen(&mut browser);
+    assert!(
+        (before[0] - now[0] - 40.0 / now[2]).abs() < 0.01,
+        "{before:?} {now:?}"
+    );
+    assert!(
+        (now[1] - before[1] - 20.0 / now[2]).abs() < 0.01,
+        "{before:?} {now:?}"
+    );
+    mouse(&mut browser, "mouseMoved", 90.0, 90.0, 0);
+    assert_eq!(seen(&mut browser), now, "the button is up");
+
+    // A finger drags, two pinch.
+    let touch = |browser: &mut Browser, kind: &str, fingers: &[[f64; 2]]| {
+        let each = fingers.iter().enumerate();
+        let points: Vec<Value> = each
+            .map(|(id, [dx, dy])| json!({"x": x + dx, "y": y + dy, "id": id}))
+            .collect();
+        browser.call(
+            "Input.dispatchTouchEvent",
+            json!({"type": kind, "touchPoints": points}),
+        );
+    };
+    let before = seen(&mut browser);
+    touch(&mut browser, "touchStart", &[[0.0, 0.0]]);
+    touch(&mut browser, "touchMove", &[[-30.0, 10.0]]);
+    touch(&mut browser, "touchEnd", &[]);
+    let now = until("a finger's way", || {
+        Some(seen(&mut browser)).filter(|now| now[0] != before[0])
+    });
+    assert!(
+        (now[0] - before[0] - 30.0 / now[2]).abs() < 0.01,
+        "{before:?} {now:?}"
+    );
+    let before = now;
+    touch(&mut browser, "touchStart", &[[-50.0, 0.0]]);
+    touch(&mut browser, "touchStart", &[[-50.0, 0.0], [50.0, 0.0]]);
+    touch(&mut browser, "touchMove", &[[-100.0, 0.0], [50.0, 0.0]]);
+    touch(&mut browser, "touchMove", &[[-100.0, 0.0], [100.0, 0.0]]);
+    touch(&mut browser, "touchEnd", &[]);
+    until("twice as large", || {
+        let now = seen(&mut browser);
+        ((now[2] / before[2] - 2.0).abs() < 0.01).then_some(())
+    });
+    touch(&mut browser, "touchStart", &[[0.0, 0.0]]);
+    touch(&mut browser, "touchEnd", &[]);
+    assert_eq!(browser.eval("view.pointers.size"), 0, "no finger is left");
+
+    // The tile that is rendered moves on.
+    let first = until("tile", || {
+        Some(browser.text("tile")).filter(|t| t.contains(" to "))
+    });
+    until("the next tile", || {
+        (browser.text("tile") != first).then_some(())
+    });
+    browser.eval("view.fit()");
+    browser.shot("tile.png");
+    running.interrupt();
+    until("end", || {
+        (browser.eval("document.getElementById('tilebox').hidden") == true).then_some(())
+    });
+    browser.complaints.retain(|c| !c.contains("net::ERR"));
+    assert_eq!(browser.complaints, [""; 0]);
+}
+
 #[test]
 fn a_night_is_seen_at_a_glance() {
     let bench = Bench::new();
@@ -305,7 +415,7 @@ fn a_night_is_seen_at_a_glance() {
     );
     browser.eval("document.querySelector('#cards button').click()");
     until("film", || {
-        (browser.eval("view.whole !== null") == true).then_some(())
+        (browser.eval("Boolean(view.whole)") == true).then_some(())
     });
     browser.shot("film.png");
     assert_eq!(browser.text("title"), "Test box \u{b7} 1.npz");

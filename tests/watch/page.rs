@@ -139,6 +139,10 @@ fn the_page_is_only_for_reading_and_only_under_its_own_name() {
         "pixel?x=24&y=0",
         "pixel?x=1",
         "pixel",
+        "picture.png?exposure=bright",
+        "picture.png?exposure=nan",
+        "picture.png?exposure=101",
+        "picture.png?exposure=",
     ] {
         assert_eq!(get(&format!("/runs/0/{path}")), 400, "{path}");
     }

@@ -92,7 +92,10 @@ function showRun() {
   set("problem", run.problem ? about.file + ": " + run.problem + (run.picture ? ". The numbers are the last that were read." : "") : "");
   id("none").hidden = run.picture > 0 || !about.size[0];
   showChart();
-  view.show(run.id, about.size, about.regions);
+  const tile = now && !run.ended && about.live ? now.tile : null;
+  id("tilebox").hidden = !tile;
+  if (tile) set("tile", tile.slice(0, 2).join(", ") + " to " + tile.slice(2).join(", "));
+  view.show(run.id, about.size, about.regions, tile);
 }
 
 function showChart() {

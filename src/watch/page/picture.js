@@ -103,10 +103,15 @@ class PictureView {
     canvas.addEventListener("keydown", (e) => this.key(e));
   }
 
-  /** Shows another run, of pictures of this size. */
-  show(run, size, regions) {
+  /** Shows a run, of pictures of this size, with the regions that are rendered and the tile that was rendered last. */
+  show(run, size, regions, tile) {
     this.regions = regions;
-    if (this.run === run && this.size && this.size.join() === size.join()) return;
+    const moved = String(this.tile) !== String(tile);
+    this.tile = tile;
+    if (this.run === run && this.size && this.size.join() === size.join()) {
+      if (moved) this.draw();
+      return;
+    }
     if (!size[0]) return;
     Object.assign(this, { run, size, scale: 0, center: size.map((n) => n / 2), whole: null, part: null, pixel: null, range: null });
     this.changed();
@@ -277,12 +282,17 @@ class PictureView {
       const [left, top] = [place(x0, 0), place(y0, 1)];
       context.drawImage(data.canvas, left, top, place(x0 + data.width * data.k, 0) - left, place(y0 + data.height * data.k, 1) - top);
     }
-    for (const [x0, y0, x1, y1] of this.regions || []) {
-      context.strokeStyle = "#888";
-      context.lineWidth = ratio;
-      context.setLineDash([4 * ratio, 3 * ratio]);
+    const frame = ([x0, y0, x1, y1], colour, wide, dashes) => {
+      Object.assign(context, { strokeStyle: colour, lineWidth: wide * ratio });
+      context.setLineDash(dashes.map((n) => n * ratio));
       context.strokeRect(place(x0, 0), place(y0, 1), place(x1, 0) - place(x0, 0), place(y1, 1) - place(y0, 1));
       context.setLineDash([]);
+    };
+    for (const region of this.regions || []) frame(region, "#888", 1, [4, 3]);
+    // Small pictures are one tile, of which nothing need be said.
+    if (this.tile && String(this.tile) !== String([0, 0, ...this.size])) {
+      frame(this.tile, "#000", 3, []);
+      frame(this.tile, "#56b4e9", 1, []);
     }
     if (this.pixel && this.whole) {
       const [x, y] = this.pixel;
