@@ -299,10 +299,72 @@ fn every_scene_is_a_pbrt_file() {
     }
 }
 
+/// What pbrt-v4 would refuse, or take for something else, our reader refuses.
 #[test]
-#[should_panic(expected = "has no \"float raduis\"")]
 fn the_reader_is_strict() {
-    read_pbrt("WorldBegin\nShape \"sphere\" \"float raduis\" 1");
+    let sphere = "Shape \"sphere\" \"float radius\" 1";
+    read_pbrt(&format!("WorldBegin\n{sphere}"));
+    for (text, why) in [
+        (
+            "WorldBegin\nShape \"sphere\" \"float raduis\" 1",
+            "has no \"float raduis\"",
+        ),
+        (
+            "WorldBegin\nShape \"sphere\" \"integer radius\" 1",
+            "has no \"integer radius\"",
+        ),
+        (
+            "WorldBegin\nShape \"ball\" \"float radius\" 1",
+            "no Shape \"ball\"",
+        ),
+        (
+            "WorldBegin\nShape \"sphere\" \"float radius\" \"1\"",
+            "float radius is",
+        ),
+        (
+            "WorldBegin\nShape \"sphere\" \"float radius\" inf",
+            "float radius is",
+        ),
+        (
+            "WorldBegin\nAreaLightSource \"diffuse\" \"rgb L\" [1 1]",
+            "rgb L is",
+        ),
+        (
+            "WorldBegin\nAreaLightSource \"diffuse\" \"bool twosided\" \"false\"",
+            "bool twosided is",
+        ),
+        (
+            "Sampler \"independent\" \"integer pixelsamples\" 1.5\nWorldBegin",
+            "integer pixelsamples is",
+        ),
+        (
+            "WorldBegin\nNamedMaterial \"glass\"",
+            "a material that is not made",
+        ),
+        (
+            "WorldBegin\nMakeNamedMaterial \"a\" \"string type\" \"phong\"",
+            "no Material \"phong\"",
+        ),
+        (
+            "WorldBegin\nCamera \"perspective\" \"float fov\" 40",
+            "on the wrong side of WorldBegin",
+        ),
+        (sphere, "on the wrong side of WorldBegin"),
+        ("WorldBegin\nAttributeEnd", "depth >= 0"),
+        ("WorldBegin\nAttributeBegin", "depth == 0"),
+        (
+            "WorldBegin\nTranslate 1 2",
+            "index out of range|out of range for slice|range end index",
+        ),
+        ("WorldBegin\n\"sphere\"", "in place of a directive"),
+        ("WorldBegin\nShape \"sphere", "a string without an end"),
+    ] {
+        let fault = std::panic::catch_unwind(|| read_pbrt(text)).expect_err(text);
+        let said = fault.downcast_ref::<String>().cloned();
+        let said = said.or_else(|| fault.downcast_ref::<&str>().map(|s| (*s).to_owned()));
+        let said = said.unwrap_or_default();
+        assert!(why.split('|').any(|w| said.contains(w)), "{text:?}: {said}");
+    }
 }
 
 #[test]

@@ -1,26 +1,16 @@
 //! Mitsuba 3's XML.
 
-use super::planes::{Cut, Rectangle, cut, extent};
-use super::{
-    Exported, Mix, NOT_ONE, PHONG, about, frame, is_nothing, is_phong, not_one, numbers, origin,
-};
+use super::planes::{Rectangle, extent};
+use super::text::Text;
+use super::{Exported, Mix, frame, not_one, numbers, origin};
 use crate::scene::{Bsdf, Scene, Shape};
 use crate::settings::Settings;
 use glam::DVec3;
-use std::fmt::Write as _;
+use std::ops::{Deref, DerefMut};
 
 /// The scene as Mitsuba reads it, for its RGB variants.
 pub(super) fn export(scene: &Scene, settings: &Settings, samples: u64) -> Exported {
-    let mut out = Writer {
-        warnings: [
-            about(scene, is_phong, PHONG),
-            about(scene, is_nothing, NOT_ONE),
-        ]
-        .into_iter()
-        .flatten()
-        .collect(),
-        ..Writer::default()
-    };
+    let mut out = Xml(Text::new(scene, &[]));
     // A comment has no two dashes in a row. The first time leaves pairs where there were three.
     let comment = escape(&origin(scene))
         .replace("--", "- -")
@@ -65,13 +55,10 @@ pub(super) fn export(scene: &Scene, settings: &Settings, samples: u64) -> Export
         shape(&mut out, scene, k, primitive.shape, material);
     }
     out.close("scene");
-    Exported {
-        text: out.text,
-        warnings: out.warnings,
-    }
+    out.0.end()
 }
 
-fn camera(out: &mut Writer, scene: &Scene, settings: &Settings) {
+fn camera(out: &mut Xml, scene: &Scene, settings: &Settings) {
     let camera = &scene.camera;
     let [width, height] = settings.size;
     out.open("sensor type=\"perspective\"");
@@ -103,7 +90,7 @@ fn camera(out: &mut Writer, scene: &Scene, settings: &Settings) {
     out.close("sensor");
 }
 
-fn bsdf(out: &mut Writer, name: &str, bsdf: Bsdf) {
+fn bsdf(out: &mut Xml, name: &str, bsdf: Bsdf) {
     let id = escape(name);
     match bsdf {
         Bsdf::Diffuse { reflectance } => {
@@ -151,13 +138,13 @@ fn bsdf(out: &mut Writer, name: &str, bsdf: Bsdf) {
     }
 }
 
-fn diffuse(out: &mut Writer, reflectance: DVec3) {
+fn diffuse(out: &mut Xml, reflectance: DVec3) {
     out.open("bsdf type=\"diffuse\"");
     out.value("rgb", "reflectance", &numbers(reflectance));
     out.close("bsdf");
 }
 
-fn shape(out: &mut Writer, scene: &Scene, index: usize, shape: Shape, material: &str) {
+fn shape(out: &mut Xml, scene: &Scene, index: usize, shape: Shape, material: &str) {
     let reference = format!("<ref id=\"{}\"/>", escape(material));
     match shape {
         Shape::Sphere { center, radius } => {
@@ -181,13 +168,8 @@ fn shape(out: &mut Writer, scene: &Scene, index: usize, shape: Shape, material: 
             out.close("shape");
         }
         Shape::Plane { point, normal } => {
-            let rectangle = match cut(scene, index, point, normal) {
-                Cut::Hidden => return out.line("<!-- A plane that is behind others. -->"),
-                Cut::Rectangle(rectangle) => rectangle,
-                Cut::Horizon(rectangle) => {
-                    out.warnings.push(horizon(material, &rectangle));
-                    rectangle
-                }
+            let Some(rectangle) = out.seen(scene, index, [point, normal], material) else {
+                return out.line("<!-- A plane that is behind others. -->");
             };
             out.open("shape type=\"rectangle\"");
             out.rectangle(&rectangle);
@@ -217,12 +199,6 @@ fn shape(out: &mut Writer, scene: &Scene, index: usize, shape: Shape, material: 
     }
 }
 
-/// What is missing of a plane that nothing bounds.
-pub(super) fn horizon(material: &str, rectangle: &Rectangle) -> String {
-    let [a, b] = rectangle.half.map(|h| 2.0 * h);
-    format!("a plane of {material} has no end; the export has a rectangle of {a:.6} x {b:.6} of it")
-}
-
 /// Text for XML.
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
@@ -234,23 +210,23 @@ fn escape(text: &str) -> String {
         .collect()
 }
 
-/// Indented XML.
-#[derive(Default)]
-struct Writer {
-    text: String,
-    depth: usize,
-    warnings: Vec<String>,
+/// XML.
+struct Xml(Text);
+
+impl Deref for Xml {
+    type Target = Text;
+    fn deref(&self) -> &Text {
+        &self.0
+    }
 }
 
-impl Writer {
-    fn line(&mut self, line: &str) {
-        let _ = writeln!(self.text, "{:1$}{line}", "", 4 * self.depth);
+impl DerefMut for Xml {
+    fn deref_mut(&mut self) -> &mut Text {
+        &mut self.0
     }
+}
 
-    fn gap(&mut self) {
-        self.text.push('\n');
-    }
-
+impl Xml {
     fn open(&mut self, tag: &str) {
         self.line(&format!("<{tag}>"));
         self.depth += 1;

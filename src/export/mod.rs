@@ -7,6 +7,7 @@ mod frame;
 mod mitsuba;
 mod pbrt;
 mod planes;
+mod text;
 
 use crate::scene::{Bsdf, Scene};
 use crate::settings::{Overrides, Settings};

@@ -1,36 +1,17 @@
 //! pbrt-v4's format.
 
-use super::mitsuba::horizon;
-use super::planes::{Cut, cut};
-use super::{
-    Exported, Mix, NOT_ONE, PHONG, about, frame, is_nothing, is_phong, not_one, numbers, origin,
-};
+use super::text::Text;
+use super::{Exported, Mix, frame, not_one, numbers, origin};
 use crate::scene::{Bsdf, Scene, Shape};
 use crate::settings::Settings;
 use glam::{DMat3, DVec3};
-use std::fmt::Write as _;
+use std::ops::{Deref, DerefMut};
 
 /// The scene as pbrt reads it. `picture` is the file that it renders to.
 pub(super) fn export(scene: &Scene, settings: &Settings, samples: u64, picture: &str) -> Exported {
-    let mirror = |b: &Bsdf| matches!(b, Bsdf::Mirror { .. });
-    let tinted = |b: &Bsdf| matches!(b, Bsdf::Dielectric { transmittance, .. } if *transmittance != DVec3::ONE);
+    let tint = "pbrt's glass has no tint, and transmittance is left out";
     let grazing = "pbrt has no mirror that reflects alike at every angle, and its conductor reflects more at grazing angles";
-    let mut out = Writer {
-        warnings: [
-            about(scene, mirror, grazing),
-            about(
-                scene,
-                tinted,
-                "pbrt's glass has no tint, and transmittance is left out",
-            ),
-            about(scene, is_phong, PHONG),
-            about(scene, is_nothing, NOT_ONE),
-        ]
-        .into_iter()
-        .flatten()
-        .collect(),
-        ..Writer::default()
-    };
+    let mut out = Writer(Text::new(scene, &[(is_mirror, grazing), (is_tinted, tint)]));
     let comment = origin(scene).replace(|c: char| c.is_control(), " ");
     out.line(&format!("# {comment}"));
     out.line("#     pbrt FILE");
@@ -59,10 +40,15 @@ pub(super) fn export(scene: &Scene, settings: &Settings, samples: u64, picture: 
         let material = &scene.materials[primitive.material].name;
         shape(&mut out, scene, k, primitive.shape, material);
     }
-    Exported {
-        text: out.text,
-        warnings: out.warnings,
-    }
+    out.0.end()
+}
+
+fn is_mirror(bsdf: &Bsdf) -> bool {
+    matches!(bsdf, Bsdf::Mirror { .. })
+}
+
+fn is_tinted(bsdf: &Bsdf) -> bool {
+    matches!(bsdf, Bsdf::Dielectric { transmittance, .. } if *transmittance != DVec3::ONE)
 }
 
 fn head(out: &mut Writer, scene: &Scene, settings: &Settings, samples: u64, picture: &str) {
@@ -169,13 +155,8 @@ fn shape(out: &mut Writer, scene: &Scene, index: usize, shape: Shape, material: 
             out.close();
         }
         Shape::Plane { point, normal } => {
-            let r = match cut(scene, index, point, normal) {
-                Cut::Hidden => return out.line("# A plane that is behind others."),
-                Cut::Rectangle(rectangle) => rectangle,
-                Cut::Horizon(rectangle) => {
-                    out.warnings.push(horizon(material, &rectangle));
-                    rectangle
-                }
+            let Some(r) = out.seen(scene, index, [point, normal], material) else {
+                return out.line("# A plane that is behind others.");
             };
             let [x, y] = [r.half[0] * r.axes.x_axis, r.half[1] * r.axes.y_axis];
             let corners = [-x - y, x - y, -x + y, x + y].map(|d| numbers(r.center + d));
@@ -215,23 +196,23 @@ fn quoted(text: &str) -> String {
     escaped.replace(|c: char| c.is_control(), " ")
 }
 
-/// Indented text.
-#[derive(Default)]
-struct Writer {
-    text: String,
-    depth: usize,
-    warnings: Vec<String>,
+/// pbrt's directives.
+struct Writer(Text);
+
+impl Deref for Writer {
+    type Target = Text;
+    fn deref(&self) -> &Text {
+        &self.0
+    }
+}
+
+impl DerefMut for Writer {
+    fn deref_mut(&mut self) -> &mut Text {
+        &mut self.0
+    }
 }
 
 impl Writer {
-    fn line(&mut self, line: &str) {
-        let _ = writeln!(self.text, "{:1$}{line}", "", 4 * self.depth);
-    }
-
-    fn gap(&mut self) {
-        self.text.push('\n');
-    }
-
     fn open(&mut self) {
         self.line("AttributeBegin");
         self.depth += 1;
