@@ -7,6 +7,7 @@ mod program;
 
 mod bench;
 mod bits;
+mod doubts;
 mod files;
 mod info;
 mod kinds;
