@@ -19,7 +19,7 @@ fn main() -> Result<(), Error> {
     })?;
 
     match picture.ended() {
-        StopReason::Error => println!("reached the error"),
+        Some(StopReason::Error) => println!("reached the error"),
         reason => println!("ended early: {reason:?}"),
     }
     // Each pixel has an error of its own; this is the largest, as a radiance.

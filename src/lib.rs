@@ -45,8 +45,8 @@ pub use film::{Estimate, Film};
 pub use glam::DVec3;
 pub use provenance::{DeviceUse, Provenance};
 pub use render::{
-    Backend, CPU_TIME, DEFAULT_SPP, Error, MAX_SAMPLES, Options, Picture, Progress, render,
-    render_with,
+    Backend, CPU_TIME, DEFAULT_SPP, Error, MAX_SAMPLES, Options, Picture, Progress, Renderer,
+    merge, render, render_with,
 };
 pub use run::StopReason;
 pub use scene::{Scene, SceneBuilder};
@@ -102,3 +102,8 @@ pub mod plot;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod watch;
+
+/// The examples of its page are tests.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/library.md")]
+struct LibraryPage;

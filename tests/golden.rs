@@ -5,7 +5,7 @@
 mod common;
 
 use common::{film, gpu, read, scene_files, settings};
-use etendue::compare::{Limits, Picture, compare};
+use etendue::compare::{Limits, Side, compare};
 use etendue::kernel::Access;
 use etendue::output::write_png;
 use etendue::provenance::Provenance;
@@ -43,8 +43,7 @@ fn check(name: &str) {
         return;
     }
     // The samples are the same on every adapter but for paths that rounding sends elsewhere: nobody sees a difference.
-    let read =
-        |p: &Path| Picture::read(p).unwrap_or_else(|e| panic!("{e}; ETENDUE_BLESS=1 makes it"));
+    let read = |p: &Path| Side::read(p).unwrap_or_else(|e| panic!("{e}; ETENDUE_BLESS=1 makes it"));
     let limits = Limits {
         max_flip: Some(LARGEST_FLIP),
         ..Limits::default()

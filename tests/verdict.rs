@@ -6,7 +6,7 @@
 mod common;
 
 use common::{film, read, scene, settings};
-use etendue::compare::{Limits, Picture, compare};
+use etendue::compare::{Limits, Side, compare};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
 use etendue::gpu::{Choice, Gpu, GpuEngine};
@@ -47,7 +47,7 @@ impl Camera {
         }
     }
 
-    fn shoot(&mut self, seed: u32, samples: u64) -> Picture {
+    fn shoot(&mut self, seed: u32, samples: u64) -> Side {
         self.settings.seed = seed;
         self.engine.reseed(seed);
         let film = film(&mut self.engine, &self.settings, samples);
@@ -55,12 +55,12 @@ impl Camera {
     }
 }
 
-fn picture(film: &Film, provenance: &Provenance) -> Picture {
-    Picture::from_film("film".into(), film, provenance).expect("it has samples")
+fn picture(film: &Film, provenance: &Provenance) -> Side {
+    Side::from_film("film".into(), film, provenance).expect("it has samples")
 }
 
 /// The smallest false-alarm rate at which the two are different.
-fn p(a: &Picture, b: &Picture) -> f64 {
+fn p(a: &Side, b: &Side) -> f64 {
     let comparison = compare(a, b, &Limits::default()).expect("comparable");
     comparison.verdict.expect("both state their noise").p
 }

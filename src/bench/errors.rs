@@ -1,6 +1,6 @@
 //! The error of a picture: measured against a reference, and as the picture states it.
 
-use crate::compare::{Picture, flip};
+use crate::compare::{Side, flip};
 use crate::film::Film;
 use crate::stats::luminance;
 
@@ -46,7 +46,7 @@ pub struct Errors {
 
 impl Truth {
     /// A picture as the reference. The error says why it can't be used.
-    pub fn new(picture: &Picture) -> Result<Self, String> {
+    pub fn new(picture: &Side) -> Result<Self, String> {
         if let Some(i) = picture.covered.iter().position(|covered| !covered) {
             let (x, y) = (i as u32 % picture.size[0], i as u32 / picture.size[0]);
             return Err(format!(
@@ -144,9 +144,9 @@ mod tests {
     const SIZE: [u32; 2] = [40, 50];
 
     /// A picture of `SIZE` pixels, grey `value` and standard errors `error`.
-    fn grey(value: f64, error: Option<f64>) -> Picture {
+    fn grey(value: f64, error: Option<f64>) -> Side {
         let n = (SIZE[0] * SIZE[1]) as usize;
-        Picture {
+        Side {
             name: "reference".into(),
             size: SIZE,
             rgb: vec![[value; 3]; n],

@@ -2,7 +2,7 @@
 
 use super::engines::Contender;
 use super::errors::Truth;
-use crate::compare::Picture;
+use crate::compare::Side;
 use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::Rect;
@@ -41,7 +41,7 @@ pub struct Reference {
 
 /// Reads a picture given by the user. It must have the scene's size. If it states its scene and settings, they must match.
 pub fn given(path: &Path, scene_hash: &str, size: [u32; 2]) -> Result<Reference, FileError> {
-    let picture = Picture::read(path)?;
+    let picture = Side::read(path)?;
     let wrong = |why: String| FileError::content(path, why);
     if path
         .extension()
@@ -135,7 +135,7 @@ pub fn make(
         }
     }
     let samples = film.coverage.samples().0;
-    let picture = Picture::from_film("reference".into(), &film, &provenance)?;
+    let picture = Side::from_film("reference".into(), &film, &provenance)?;
     Ok(Some(Reference {
         truth: Truth::new(&picture)?,
         about: contender.identity(),

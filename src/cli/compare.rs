@@ -5,7 +5,7 @@ use super::failure::Failure;
 use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::{say, write_stdout};
-use crate::compare::{LABELS, Limits, Picture, compare as compare_pictures, html};
+use crate::compare::{LABELS, Limits, Side, compare as compare_pictures, html};
 use crate::files::atomic;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let mut read = |done: usize, samples: Option<u64>| {
         let paths = &sides[done];
         progress.step(done, STEPS, &paths[0].display().to_string());
-        Picture::read_renders(paths, samples)
+        Side::read_renders(paths, samples)
     };
     let (a, b) = (read(0, args.spp_a)?, read(1, args.spp_b)?);
     progress.step(2, STEPS, "comparing");

@@ -10,7 +10,7 @@ use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
 use crate::log::{Held, Start, Target};
 use crate::provenance::Provenance;
-use crate::render::plan::end_for;
+use crate::render::plan::{end_for, held_regions};
 use crate::render::{CPU_TIME, DEFAULT_SPP, MAX_SAMPLES};
 use crate::run::Job;
 use crate::scene::Scene;
@@ -68,15 +68,8 @@ pub fn as_film(args: &RenderArgs, film: &Film) -> Result<RenderArgs, Failure> {
         return Err(Failure::Input(message.into()));
     }
     args.adaptive |= film.pilot.is_some();
-    if args.region.is_empty() && film.bounds != Rect::whole(film.size) {
-        let cells: Vec<Rect> = film.coverage.cells().map(|c| c.0).collect();
-        // If the first run ended before all regions had samples, the film knows only the rectangle around them.
-        let all_begun = cells.iter().copied().reduce(|a, b| a.union(&b)) == Some(film.bounds);
-        args.region = match &film.pilot {
-            Some(pilot) => pilot.regions().to_vec(),
-            None if all_begun => Rect::disjoint(&cells),
-            None => vec![film.bounds],
-        };
+    if args.region.is_empty() {
+        args.region = held_regions(film);
     }
     Ok(args)
 }

@@ -4,7 +4,7 @@ use super::args::RegressArgs;
 use super::regress::{engine, lines, run_one, wanted};
 use super::say;
 use super::signals::Signals;
-use crate::compare::Picture;
+use crate::compare::Side;
 use crate::files::{FileError, atomic};
 use crate::reference::CpuEngine;
 use crate::regress::report::{self, About, Done};
@@ -80,7 +80,7 @@ fn candidate(args: &RegressArgs, one: &mut Done, signals: &Signals) -> Option<Ca
     // A comparison has left its own page.
     if !matches!(one.outcome, Outcome::Failed { unsaved: None, .. }) {
         let [golden, now] = LABELS;
-        let old = Picture::read(&case.golden_path()).ok();
+        let old = Side::read(&case.golden_path()).ok();
         one.pictures = old
             .map(|old| (golden, old))
             .into_iter()

@@ -1,6 +1,6 @@
 //! Sums over blocks of pixels, for the tests of the verdict.
 
-use super::picture::Picture;
+use super::picture::Side;
 use super::verdict::{Block, Kind, ROUNDING};
 use crate::film::coverage::Rect;
 use crate::stats::luminance;
@@ -34,7 +34,7 @@ pub(super) struct Grid {
 
 impl Terms {
     /// Both pictures state their noise and are of one size. Channels are R, G, B, and the luminance.
-    pub fn new(a: &Picture, b: &Picture, channel: usize) -> Self {
+    pub fn new(a: &Side, b: &Side, channel: usize) -> Self {
         let (Some(na), Some(nb)) = (&a.noise, &b.noise) else {
             unreachable!("only pictures that state their noise are tested");
         };

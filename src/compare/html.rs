@@ -3,7 +3,7 @@
 use super::flip::encode_srgb;
 use super::text::{self, CHANNELS};
 use super::verdict::scores;
-use super::{Comparison, Picture};
+use super::{Comparison, Side};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write as _;
@@ -32,7 +32,7 @@ const SEQUENTIAL: [[f64; 3]; 5] = [
 ];
 
 /// The page about a comparison of `a` and `b`, and what it calls them.
-pub fn page(a: &Picture, b: &Picture, labels: [&str; 2], comparison: &Comparison) -> String {
+pub fn page(a: &Side, b: &Side, labels: [&str; 2], comparison: &Comparison) -> String {
     let difference = format!("{} - {}", labels[1], labels[0]);
     let scores = comparison.verdict.as_ref().map(|_| scores(a, b));
     let differences: Vec<f64> = a
@@ -146,7 +146,7 @@ pub(crate) fn fill(template: &str, values: &[(&str, String)]) -> String {
 }
 
 /// A picture as a PNG would show it, as a data URI.
-pub(crate) fn picture_uri(picture: &Picture) -> String {
+pub(crate) fn picture_uri(picture: &Side) -> String {
     uri(picture.size, picture.rgb.iter().map(|v| v.map(encode_srgb)))
 }
 
@@ -167,7 +167,7 @@ fn capital(text: &str) -> String {
 }
 
 /// The values of rendered pixels.
-fn covered(values: &[f64], picture: &Picture) -> Vec<f64> {
+fn covered(values: &[f64], picture: &Side) -> Vec<f64> {
     let pixels = values.iter().zip(&picture.covered);
     pixels.filter(|(_, c)| **c).map(|(v, _)| *v).collect()
 }
@@ -298,7 +298,7 @@ fn sensitivity(comparison: &Comparison) -> String {
     s + "</table>"
 }
 
-fn origin(a: &Picture, b: &Picture) -> String {
+fn origin(a: &Side, b: &Side) -> String {
     let mut keys: Vec<&str> = Vec::new();
     for (key, _) in a.origin.iter().chain(&b.origin) {
         if !keys.contains(&key.as_str()) {

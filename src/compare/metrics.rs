@@ -1,7 +1,7 @@
 //! Distances between two pictures, noise included.
 
 use super::flip;
-use super::picture::Picture;
+use super::picture::Side;
 use crate::stats::luminance;
 
 /// Distances over all pixels that were rendered.
@@ -24,7 +24,7 @@ pub struct Metrics {
 
 impl Metrics {
     /// Both pictures have the same size and are covered in the same pixels.
-    pub(super) fn new(a: &Picture, b: &Picture) -> Self {
+    pub(super) fn new(a: &Side, b: &Side) -> Self {
         let pairs = || {
             let pixels = a.rgb.iter().zip(&b.rgb).zip(&a.covered);
             pixels.filter(|(_, covered)| **covered).map(|(p, _)| p)

@@ -14,7 +14,7 @@ mod text;
 pub mod verdict;
 
 pub use metrics::Metrics;
-pub use picture::{Noise, Picture, Unit};
+pub use picture::{Noise, Side, Unit};
 pub use verdict::Verdict;
 
 /// The rate of false alarms over the whole picture, unless another is asked for.
@@ -101,7 +101,7 @@ pub enum Incomparable {
 }
 
 /// Compares two pictures; A is the reference where the order matters.
-pub fn compare(a: &Picture, b: &Picture, limits: &Limits) -> Result<Comparison, Incomparable> {
+pub fn compare(a: &Side, b: &Side, limits: &Limits) -> Result<Comparison, Incomparable> {
     check(a, b)?;
     let limited = limits.max_flip.is_some() || limits.max_relative_rmse.is_some();
     let identical = a.rgb == b.rgb;
@@ -139,7 +139,7 @@ pub fn compare(a: &Picture, b: &Picture, limits: &Limits) -> Result<Comparison, 
     })
 }
 
-fn check(a: &Picture, b: &Picture) -> Result<(), Incomparable> {
+fn check(a: &Side, b: &Side) -> Result<(), Incomparable> {
     if a.size != b.size {
         return Err(Incomparable::Size {
             a: a.name.clone(),
@@ -159,10 +159,10 @@ fn check(a: &Picture, b: &Picture) -> Result<(), Incomparable> {
     Ok(())
 }
 
-fn notes(a: &Picture, b: &Picture) -> Vec<String> {
+fn notes(a: &Side, b: &Side) -> Vec<String> {
     let both = |key: &str| Some((a.origin(key)?, b.origin(key)?));
     let mut notes = Vec::new();
-    let alone = |p: &&Picture| p.noise.as_ref().is_some_and(|n| n.luminance_alone);
+    let alone = |p: &&Side| p.noise.as_ref().is_some_and(|n| n.luminance_alone);
     if let Some(picture) = [a, b].into_iter().find(alone) {
         notes.push(format!(
             "{} states the noise of its luminance alone: that is tested, and a change of colour without one of brightness is not seen",
@@ -179,7 +179,7 @@ fn notes(a: &Picture, b: &Picture) -> Vec<String> {
     {
         notes.push(format!(
             "both were rendered with seed {x}: they share samples where their sample numbers overlap, and both may miss the \
-             same rare light paths; render one with another --seed"
+             same rare light paths; render one with another seed"
         ));
     }
     notes

@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// A picture and its noise, if known.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Picture {
+pub struct Side {
     /// Where it is from, for messages.
     pub name: String,
     /// Width and height in pixels.
@@ -48,7 +48,7 @@ pub enum Unit {
     Render,
 }
 
-impl Picture {
+impl Side {
     /// Reads a picture of any [`Kind`]. Only films and EXR files state their noise.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         Self::read_sampled(path, None)

@@ -1,13 +1,13 @@
 //! Several independent renders as one picture: their spread is its noise.
 
-use super::picture::{Noise, Picture, Unit};
+use super::picture::{Noise, Side, Unit};
 use crate::files::FileError;
 use crate::stats::luminance;
 use std::path::{Path, PathBuf};
 
-impl Picture {
+impl Side {
     /// One picture, or the mean of several independent renders of the same scene, which states its error by their spread. `samples` is
-    /// as for [`Picture::read_sampled`].
+    /// as for [`Side::read_sampled`].
     pub fn read_renders(paths: &[PathBuf], samples: Option<u64>) -> Result<Self, FileError> {
         let (first, others) = paths.split_first().expect("at least one path");
         if others.is_empty() {
@@ -62,7 +62,7 @@ impl Picture {
 }
 
 /// Refuses a render of another size, or of other regions.
-fn check(path: &Path, first: &Picture, next: &Picture) -> Result<(), FileError> {
+fn check(path: &Path, first: &Side, next: &Side) -> Result<(), FileError> {
     let why = if next.size != first.size {
         let ([w, h], [x, y]) = (next.size, first.size);
         format!("it has {w} x {h} pixels, but {} has {x} x {y}", first.name)

@@ -22,7 +22,7 @@
 //! (Bonferroni). No test can detect a bright path that neither picture has sampled.
 
 use super::grid::{Grid, Terms};
-use super::picture::Picture;
+use super::picture::Side;
 use crate::film::coverage::Rect;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -72,6 +72,8 @@ pub struct Finding {
     pub means: [f64; 2],
     /// Standard error of the difference of those means, as the pictures state it.
     pub error: f64,
+    /// Whether most of its light has no noise: it comes straight from a lamp.
+    pub lamp: bool,
 }
 
 /// The smallest change that the tests detect with probability [`POWER`].
@@ -98,7 +100,8 @@ pub struct Verdict {
     pub p: f64,
     /// Tests made.
     pub tests: usize,
-    /// What differs: the whole picture if it does, then at most eight disjoint blocks, most certain first.
+    /// What differs: the whole picture if it does, then at most eight disjoint blocks, most certain first, and lamps that are seen
+    /// directly after all others: they have no noise, and any change of them is certain.
     pub findings: Vec<Finding>,
     /// The detectable changes, from the whole picture to the smallest blocks.
     pub sensitivity: Vec<Sensitivity>,
@@ -112,7 +115,7 @@ impl Verdict {
 }
 
 /// Tests two pictures of the same size, covered in the same pixels, which both state their noise.
-pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
+pub fn verdict(a: &Side, b: &Side, alpha: f64) -> Verdict {
     let tested = channels(a, b);
     let terms: Vec<Terms> = tested.iter().map(|&c| Terms::new(a, b, c)).collect();
     let sides = sides(a.size);
@@ -143,6 +146,7 @@ pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
                     z,
                     means: block.means,
                     error: block.error,
+                    lamp: block.noisy_light < 0.5 * block.light,
                 }));
             }
             if kind != Kind::Small {
@@ -170,8 +174,8 @@ pub fn verdict(a: &Picture, b: &Picture, alpha: f64) -> Verdict {
 }
 
 /// The channels whose noise both pictures state: red, green and blue, or the luminance alone.
-fn channels(a: &Picture, b: &Picture) -> &'static [usize] {
-    let alone = |p: &Picture| p.noise.as_ref().is_some_and(|n| n.luminance_alone);
+fn channels(a: &Side, b: &Side) -> &'static [usize] {
+    let alone = |p: &Side| p.noise.as_ref().is_some_and(|n| n.luminance_alone);
     if alone(a) || alone(b) {
         &[3]
     } else {
@@ -180,7 +184,7 @@ fn channels(a: &Picture, b: &Picture) -> &'static [usize] {
 }
 
 /// Every pixel's difference in luminance over its noise, B less A: for maps and histograms.
-pub(super) fn scores(a: &Picture, b: &Picture) -> Vec<f64> {
+pub(super) fn scores(a: &Side, b: &Side) -> Vec<f64> {
     Terms::new(a, b, 3).scores()
 }
 
@@ -291,16 +295,53 @@ fn changes(seen: &mut Vec<f64>, grids: &[Grid], needed: f64) {
     }
 }
 
-/// The findings to report: those that are significant, and among overlapping blocks only the most significant one.
+/// The findings to report: those that are significant, and among overlapping blocks only the most significant one. Of lamps there is
+/// one at least, if there are any.
 fn pick(all: Vec<Finding>, alpha: f64) -> Vec<Finding> {
     let certain = all.into_iter().filter(|f| f.p < alpha);
     let (whole, blocks): (Vec<Finding>, Vec<Finding>) = certain.partition(|f| f.whole);
+    let blocks = blocks.into_iter();
+    let (lamps, others): (Vec<Finding>, Vec<Finding>) = blocks.partition(|f| f.lamp);
+    let room_of_others = MOST_FINDINGS - usize::from(!lamps.is_empty());
     let mut kept: Vec<Finding> = Vec::new();
-    for finding in blocks {
-        let told = |k: &Finding| k.rect.intersection(&finding.rect).is_some();
-        if kept.len() < MOST_FINDINGS && !kept.iter().any(told) {
-            kept.push(finding);
+    for (findings, most) in [(others, room_of_others), (lamps, MOST_FINDINGS)] {
+        for finding in findings {
+            let told = |k: &Finding| k.rect.intersection(&finding.rect).is_some();
+            if kept.len() < most && !kept.iter().any(told) {
+                kept.push(finding);
+            }
         }
     }
     whole.into_iter().take(1).chain(kept).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lamps_come_last_and_one_of_them_is_told() {
+        let finding = |x0: u32, p: f64, lamp: bool| Finding {
+            rect: Rect {
+                x0,
+                y0: 0,
+                x1: x0 + 1,
+                y1: 1,
+            },
+            whole: false,
+            channel: 0,
+            kind: Kind::Small,
+            p,
+            z: 9.0,
+            means: [1.0, 2.0],
+            error: 0.1,
+            lamp,
+        };
+        let lamps = (0..20).map(|k| finding(k, 0.0, true));
+        let others = (20..40).map(|k| finding(k, 1e-9, false));
+        let all: Vec<Finding> = lamps.clone().chain(others).collect();
+        let told: Vec<u32> = pick(all, 1e-3).iter().map(|f| f.rect.x0).collect();
+        assert_eq!(told, [20, 21, 22, 23, 24, 25, 26, 0]);
+        assert_eq!(pick(lamps.collect(), 1e-3).len(), MOST_FINDINGS);
+    }
 }

@@ -41,7 +41,7 @@ pub enum MergeError {
         passes: Range<u64>,
     },
     /// Only one has light paths, or they are not equally many.
-    #[error("the films do not have the same light paths (--light-paths)")]
+    #[error("the films do not have the same light paths")]
     LightPaths,
 }
 

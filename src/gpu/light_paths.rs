@@ -90,7 +90,7 @@ impl LightTracer {
     ) -> Result<Self, String> {
         if kernel.trips_per_path > gpu.trip_limit {
             let what = "one light path of this scene may take";
-            let advice = " (or give --light-paths off)";
+            let advice = " (without light paths it may take fewer)";
             return Err(trips::too_many(what, kernel.trips_per_path, advice));
         }
         let device = &gpu.device;

@@ -32,7 +32,7 @@ pub(crate) fn limit(adapter: &str, driver: &str) -> u64 {
 /// The error message for a path that may take more trips than the driver grants.
 pub(crate) fn too_many(path: &str, trips: u64, advice: &str) -> String {
     format!(
-        "{path} {trips} loop iterations{advice}, but this driver silently stops an invocation at 65535; lower max_depth or use --backend cpu"
+        "{path} {trips} loop iterations{advice}, but this driver silently stops an invocation at 65535; lower max_depth, or render on the CPU reference (backend cpu)"
     )
 }
 

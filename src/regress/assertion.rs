@@ -1,7 +1,7 @@
 //! The verdict as an assertion, for tests.
 
 use super::golden;
-use crate::compare::{Limits, Picture, compare, html};
+use crate::compare::{Limits, Side, compare, html};
 use crate::files::atomic;
 use crate::film::Film;
 use crate::provenance::Provenance;
@@ -60,14 +60,14 @@ pub fn assert_golden(path: &Path, film: &Film, provenance: &Provenance) {
 }
 
 fn check(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), String> {
-    let golden = Picture::read(path).map_err(|e| e.to_string())?;
+    let golden = Side::read(path).map_err(|e| e.to_string())?;
     if golden.origin("scene_hash") != Some(&provenance.scene_hash) {
         return Err(format!(
             "{}: this golden is of another scene or has other settings (its hash differs)",
             path.display()
         ));
     }
-    let actual = Picture::from_film("the film".into(), film, provenance)?;
+    let actual = Side::from_film("the film".into(), film, provenance)?;
     let comparison = compare(&golden, &actual, &Limits::default()).map_err(|e| e.to_string())?;
     if comparison.same() {
         return Ok(());

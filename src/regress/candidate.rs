@@ -4,7 +4,7 @@ use super::golden::{
     self, Bless, Facts, MOST_SAMPLES, NO_EVIDENCE, Wanted, no_evidence, smallest_change,
 };
 use super::{Case, MakeEngine, Trouble, render, short, text};
-use crate::compare::Picture;
+use crate::compare::Side;
 use crate::files::FileError;
 use crate::film::coverage::Rect;
 use crate::film::{Film, REPLICATES};
@@ -27,7 +27,7 @@ const FIRST_LOOK: u64 = 64;
 pub struct Candidate {
     film: Film,
     provenance: Provenance,
-    picture: Picture,
+    picture: Side,
     /// Samples per pixel.
     samples: u64,
     /// The relative change of the whole picture's brightness that comparisons with it detect.
@@ -71,7 +71,7 @@ impl Candidate {
             if !render(engine, tile, &mut film, &mut provenance, samples, stop)? {
                 return Ok(None);
             }
-            let picture = Picture::from_film(path.display().to_string(), &film, &provenance)?;
+            let picture = Side::from_film(path.display().to_string(), &film, &provenance)?;
             let power = smallest_change(&picture, wanted.alpha);
             if power <= wanted.power() || samples >= most {
                 break (power, picture);
@@ -97,7 +97,7 @@ impl Candidate {
         let (source, scene) = read(case)?;
         let (film, provenance) = store::load(path).map_err(text)?;
         let name = path.display().to_string();
-        let picture = Picture::from_film(name.clone(), &film, &provenance)?;
+        let picture = Side::from_film(name.clone(), &film, &provenance)?;
         if picture.covered.contains(&false) {
             return Err(format!("{name}: some of its pixels have no samples").into());
         }
@@ -125,7 +125,7 @@ impl Candidate {
     }
 
     /// What it shows.
-    pub fn picture(&self) -> &Picture {
+    pub fn picture(&self) -> &Side {
         &self.picture
     }
 

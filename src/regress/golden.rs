@@ -1,6 +1,6 @@
 //! Golden pictures: rendered with just enough samples, and read back with their settings.
 
-use crate::compare::{Picture, verdict::verdict};
+use crate::compare::{Side, verdict::verdict};
 use crate::files::FileError;
 use crate::film::Film;
 use crate::output::{ExrChannels, write_exr};
@@ -36,7 +36,7 @@ impl Wanted {
     }
 
     /// Whether a golden is as asked for; without a wish it is.
-    pub(super) fn met_by(&self, golden: &Picture) -> bool {
+    pub(super) fn met_by(&self, golden: &Side) -> bool {
         let samples = golden.noise.as_ref().map_or(0, |n| n.samples[0]);
         self.size.is_none_or(|size| size == golden.size)
             && self.most_samples.is_none_or(|most| samples <= most)
@@ -112,7 +112,7 @@ pub(super) fn write(path: &Path, film: &Film, provenance: &Provenance) -> Result
 pub(super) const NO_EVIDENCE: f64 = 1.0;
 
 /// The smallest change of the whole picture's brightness that a comparison with a similar picture detects.
-pub(super) fn smallest_change(picture: &Picture, alpha: f64) -> f64 {
+pub(super) fn smallest_change(picture: &Side, alpha: f64) -> f64 {
     let seen = verdict(picture, picture, alpha).sensitivity;
     seen.first().map_or(f64::INFINITY, |s| s.change)
 }
@@ -125,7 +125,7 @@ pub(super) fn no_evidence(name: &str, remedy: &str) -> String {
 }
 
 /// Refuses a golden that is no evidence. A picture that is `black` by construction is.
-pub(super) fn check_evidence(golden: &Picture, alpha: f64, black: bool) -> Result<(), String> {
+pub(super) fn check_evidence(golden: &Side, alpha: f64, black: bool) -> Result<(), String> {
     if black || smallest_change(golden, alpha) < NO_EVIDENCE {
         return Ok(());
     }
@@ -149,7 +149,7 @@ pub(super) struct Facts {
 }
 
 impl Facts {
-    pub fn read(golden: &Picture) -> Result<Self, String> {
+    pub fn read(golden: &Side) -> Result<Self, String> {
         let (name, find) = (&golden.name, |key| golden.origin(key));
         let lacks =
             |key: &str| format!("{name}: its header has no {key}; re-create it with --bless");
@@ -221,6 +221,6 @@ impl Facts {
     }
 }
 
-fn number<T: FromStr>(golden: &Picture, key: &str) -> Option<T> {
+fn number<T: FromStr>(golden: &Side, key: &str) -> Option<T> {
     golden.origin(key)?.parse().ok()
 }

@@ -18,7 +18,7 @@ pub use candidate::{Candidate, left_films};
 #[doc(hidden)]
 pub use golden::{Bless, Wanted};
 
-use crate::compare::{Comparison, Limits, Picture, compare, html};
+use crate::compare::{Comparison, Limits, Side, compare, html};
 use crate::engine::Engine;
 use crate::files::{FileError, atomic};
 use crate::film::Film;
@@ -70,7 +70,7 @@ pub const LABELS: [&str; 2] = ["golden", "now"];
 /// A scene's picture beside its golden.
 struct Judged {
     /// Golden and actual picture.
-    pictures: [Picture; 2],
+    pictures: [Side; 2],
     comparison: Comparison,
     film: Film,
     provenance: Provenance,
@@ -203,7 +203,7 @@ impl Case {
         engine: &MakeEngine,
         limits: &Limits,
         stop: &AtomicBool,
-    ) -> Option<(Outcome, Option<[Picture; 2]>)> {
+    ) -> Option<(Outcome, Option<[Side; 2]>)> {
         match (self.scene, self.golden) {
             (false, _) => return Some((Outcome::Orphaned, None)),
             (_, false) => {
@@ -238,8 +238,8 @@ impl Case {
         wanted: &Wanted,
         limits: &Limits,
         stop: &AtomicBool,
-    ) -> Option<(Outcome, Option<[Picture; 2]>)> {
-        let replaced = match self.golden.then(|| Picture::read(&self.golden_path())) {
+    ) -> Option<(Outcome, Option<[Side; 2]>)> {
+        let replaced = match self.golden.then(|| Side::read(&self.golden_path())) {
             None => None,
             Some(Err(e)) => Some(text(e)),
             Some(Ok(golden)) if !wanted.met_by(&golden) => {
@@ -284,7 +284,7 @@ impl Case {
         limits: &Limits,
         stop: &AtomicBool,
     ) -> Result<Option<Judged>, Trouble> {
-        let golden = Picture::read(&self.golden_path()).map_err(text)?;
+        let golden = Side::read(&self.golden_path()).map_err(text)?;
         let facts = golden::Facts::read(&golden)?;
         let source = parse::read_text(&self.scene_path()).map_err(text)?;
         let scene = parse::parse_str(&self.scene_path(), &source)
@@ -320,7 +320,7 @@ impl Case {
             return Ok(None);
         }
         let name = self.scene_path().display().to_string();
-        let actual = Picture::from_film(name, &film, &provenance)?;
+        let actual = Side::from_film(name, &film, &provenance)?;
         let mut comparison = compare(&golden, &actual, limits).map_err(text)?;
         comparison.labels = LABELS;
         Ok(Some(Judged {

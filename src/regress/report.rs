@@ -1,7 +1,7 @@
 //! The results of a regression run: as JUnit XML and as an HTML page.
 
 use super::{Case, Outcome};
-use crate::compare::{Picture, html};
+use crate::compare::{Side, html};
 use crate::engine::DeviceInfo;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -17,7 +17,7 @@ pub struct Done {
     /// Its result.
     pub outcome: Outcome,
     /// Golden and actual picture, those that there are, with what pages call them.
-    pub pictures: Vec<(&'static str, Picture)>,
+    pub pictures: Vec<(&'static str, Side)>,
     /// How long it took.
     pub time: Duration,
 }

@@ -7,6 +7,7 @@ use crate::kernel::Access;
 use crate::reference::{CpuEngine, Estimator};
 use crate::settings::Settings;
 use crate::world::World;
+use std::sync::Arc;
 
 /// What renders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -40,6 +41,55 @@ pub struct Chosen {
     pub note: Option<String>,
 }
 
+/// A device that is open, for one engine after another; or the CPU reference.
+#[derive(Clone)]
+pub struct Device {
+    gpu: Option<Arc<Gpu>>,
+    /// Why the CPU reference renders although the user did not ask for it.
+    note: Option<String>,
+    backend: Backend,
+    adapter: Option<String>,
+}
+
+impl Device {
+    /// The device that `backend` and `adapter` select.
+    pub fn open(backend: Backend, adapter: Option<&str>) -> Result<Self, Error> {
+        let (gpu, note) = open(backend, adapter)?;
+        Ok(Self {
+            gpu: gpu.map(Arc::new),
+            note,
+            backend,
+            adapter: adapter.map(str::to_owned),
+        })
+    }
+
+    /// An engine on it, ready for this scene. Calls `tell` at each step of the preparation.
+    pub fn engine(
+        &self,
+        world: &World,
+        settings: &Settings,
+        tell: impl FnMut(Making),
+    ) -> Result<Chosen, Error> {
+        let Some(gpu) = &self.gpu else {
+            return Ok(cpu(world, settings, self.note.clone()));
+        };
+        match GpuEngine::on_telling(gpu.clone(), world, settings, None, tell) {
+            Ok(engine) => Ok(Chosen {
+                compile_seconds: engine.compile_seconds(),
+                wgsl: Some(engine.kernel().wgsl.clone()),
+                access: Some(engine.kernel().access),
+                tile_pixels: tile_pixels(engine.device()),
+                engine: Box::new(engine),
+                note: None,
+            }),
+            Err(e) => {
+                let note = instead(&e, self.backend, self.adapter.as_deref())?;
+                Ok(cpu(world, settings, Some(note)))
+            }
+        }
+    }
+}
+
 /// The engine that `backend` and `adapter` select, ready for this scene. Calls `tell` at each step of the preparation.
 pub fn choose(
     backend: Backend,
@@ -48,28 +98,7 @@ pub fn choose(
     settings: &Settings,
     tell: impl FnMut(Making),
 ) -> Result<Chosen, Error> {
-    if backend == Backend::Cpu {
-        return Ok(cpu(world, settings, None));
-    }
-    let choice = gpu::Choice {
-        name: adapter.map(str::to_owned),
-    };
-    let made =
-        Gpu::open(&choice).and_then(|gpu| GpuEngine::on_telling(gpu, world, settings, None, tell));
-    match made {
-        Ok(engine) => Ok(Chosen {
-            compile_seconds: engine.compile_seconds(),
-            wgsl: Some(engine.kernel().wgsl.clone()),
-            access: Some(engine.kernel().access),
-            tile_pixels: tile_pixels(engine.device()),
-            engine: Box::new(engine),
-            note: None,
-        }),
-        Err(e) => {
-            let note = instead(&e, backend, adapter)?;
-            Ok(cpu(world, settings, Some(note)))
-        }
-    }
+    Device::open(backend, adapter)?.engine(world, settings, tell)
 }
 
 /// Opens the adapter that `backend` and `adapter` select. `None` means the CPU reference; the second value then says why,
@@ -95,7 +124,7 @@ fn instead(e: &GpuError, backend: Backend, adapter: Option<&str>) -> Result<Stri
     match e {
         // The reference would hide it.
         GpuError::Kernel(_) => Err(Error::Device(format!(
-            "{e}; --backend cpu renders without a kernel"
+            "{e}; the CPU reference (backend cpu) renders without a kernel"
         ))),
         _ if backend == Backend::Auto && adapter.is_none() => {
             let faster = match e {

@@ -17,24 +17,81 @@ const OUTPUT_BYTES: u64 = 40;
 /// the buffer that is read back, counters, and their copies.
 const TILE_BYTES: u64 = 384;
 
-fn needed(pixels: u64, light_paths: bool) -> u64 {
-    let splats = if light_paths { SPLAT_BYTES } else { 0 };
-    let film = pixels.saturating_mul(FILM_BYTES + splats + OUTPUT_BYTES);
-    film.saturating_add(pixels.min(MAX_TILE_PIXELS) * TILE_BYTES)
+/// Bytes per pixel of the values that a page or tev gets: mean, errors and samples, as f32.
+const SHOWN_BYTES: u64 = 32;
+
+/// Copies of the film at the same time while someone looks at it: the last one, and the next.
+const COPIES: u64 = 2;
+
+/// What a render needs memory for.
+#[derive(Debug, Clone, Copy)]
+pub struct Need {
+    /// Pixels of its film.
+    pub pixels: u64,
+    /// Whether the film has room for light paths.
+    pub light_paths: bool,
+    /// Whether the film is still to be made, and not in memory already.
+    pub film: bool,
+    /// Whether it may be looked at while it grows: on a page, or in tev.
+    pub shown: bool,
+}
+
+impl Need {
+    /// Of a new film.
+    fn film(pixels: u64, light_paths: bool) -> Self {
+        Self {
+            pixels,
+            light_paths,
+            film: true,
+            shown: false,
+        }
+    }
+
+    /// Bytes.
+    fn bytes(self) -> u64 {
+        let splats = if self.light_paths { SPLAT_BYTES } else { 0 };
+        let film = FILM_BYTES + splats;
+        let mut of_pixel = OUTPUT_BYTES;
+        if self.film {
+            of_pixel += film;
+        }
+        if self.shown {
+            of_pixel += COPIES * (film + SHOWN_BYTES);
+        }
+        let tile = self.pixels.min(MAX_TILE_PIXELS) * TILE_BYTES;
+        self.pixels.saturating_mul(of_pixel).saturating_add(tile)
+    }
 }
 
 /// Refuses a film of `pixels` pixels that does not fit into memory, with room for light paths or without.
 pub fn check(pixels: u64, light_paths: bool) -> Result<(), Error> {
-    match available() {
-        Some(have) if needed(pixels, light_paths) > have => Err(Error::Input(format!(
-            "a film of {:.1} million pixels needs {:.1} GB of memory, but only {:.1} GB are free; use a smaller --size, \
-                 or render one --region at a time",
-            pixels as f64 / 1e6,
-            needed(pixels, light_paths) as f64 / 1e9,
-            have as f64 / 1e9,
-        ))),
-        _ => Ok(()),
+    check_need(Need::film(pixels, light_paths))
+}
+
+/// Refuses what does not fit into memory.
+pub fn check_need(need: Need) -> Result<(), Error> {
+    let Some(have) = available() else {
+        return Ok(());
+    };
+    if need.bytes() <= have {
+        return Ok(());
     }
+    let what = if need.film {
+        "a film"
+    } else {
+        "to show a film"
+    };
+    let shown = match need.shown {
+        true if need.film => ", of which two thirds are for those who look at it while it grows",
+        _ => "",
+    };
+    Err(Error::Input(format!(
+        "{what} of {:.1} million pixels needs {:.1} GB of memory{shown}, but only {:.1} GB are free; use a smaller size, or render \
+         one region at a time",
+        need.pixels as f64 / 1e6,
+        need.bytes() as f64 / 1e9,
+        have as f64 / 1e9,
+    )))
 }
 
 /// Bytes that this process can still allocate. Known on Linux only.
@@ -80,13 +137,35 @@ mod tests {
 
     #[test]
     fn pictures_too_large_for_memory_are_refused() {
-        check(512 * 384, true).unwrap();
+        let small = Need::film(512 * 384, true);
+        check_need(Need {
+            shown: true,
+            ..small
+        })
+        .unwrap();
         if available().is_some() {
             let message = check(1 << 40, false).unwrap_err().to_string();
             assert!(message.contains("255087.1 GB"), "{message}");
             let message = check(1 << 40, true).unwrap_err().to_string();
             assert!(message.contains("413416.8 GB"), "{message}");
         }
+    }
+
+    #[test]
+    fn copies_for_those_who_look_count() {
+        let film = Need::film(1 << 20, false);
+        let shown = Need {
+            shown: true,
+            ..film
+        };
+        let held = Need {
+            film: false,
+            ..shown
+        };
+        let pixel = |need: Need| need.bytes() >> 20;
+        assert_eq!(pixel(film), 128 + 64 + 40 + 384);
+        assert_eq!(pixel(shown) - pixel(film), 2 * (128 + 64 + 32));
+        assert_eq!(pixel(shown) - pixel(held), 128 + 64);
     }
 
     #[test]

@@ -5,26 +5,24 @@ pub mod backend;
 pub mod memory;
 mod picture;
 pub mod plan;
+mod renderer;
 
 pub use backend::Backend;
-pub use picture::Picture;
+pub use picture::{Picture, merge};
+pub use renderer::Renderer;
 
-use crate::engine::{DeviceInfo, EngineError};
+use crate::engine::DeviceInfo;
 use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::film::error::RelativeError;
-use crate::film::pilot::Pilot;
 use crate::provenance::Provenance;
-use crate::run::{self, Job, Run, StopReason, Tally};
+use crate::run::Tally;
 use crate::scene::parse::ReadError;
-use crate::scene::{
-    self, Canonical, Diagnostic, Invalid, LARGEST_RESOLUTION, LARGEST_STRATA, Scene,
-};
-use crate::settings::{Integrator, LightParts, Overrides, Settings};
-use crate::world::World;
+use crate::scene::{Diagnostic, Invalid, LARGEST_RESOLUTION, LARGEST_STRATA, Scene};
+use crate::settings::{Integrator, LightParts, Overrides};
 use std::io::ErrorKind;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -96,6 +94,9 @@ impl From<Invalid> for Error {
 pub struct Options {
     /// Stop when every pixel has this many samples (with `adaptive`: on average).
     pub spp: Option<u64>,
+    /// Take only the samples of these numbers: disjoint ones may be taken on several machines and [merged](crate::merge). Not together
+    /// with another stop condition, or with `adaptive`.
+    pub numbers: Option<Range<u64>>,
     /// Stop after this long in the engine, but not before every pixel has a sample. How many samples that is differs from run
     /// to run.
     pub time: Option<Duration>,
@@ -146,6 +147,19 @@ impl Options {
             within("a side of size", side, 1, LARGEST_RESOLUTION.into())?;
         }
         within("spp", self.spp, 1, MAX_SAMPLES)?;
+        if let Some(numbers) = &self.numbers {
+            if numbers.start >= numbers.end || numbers.end > MAX_SAMPLES {
+                let Range { start, end } = numbers;
+                return Err(Error::Input(format!(
+                    "numbers are {start}..{end}, but must end after they start, and at {MAX_SAMPLES} at most"
+                )));
+            }
+            let other = self.spp.is_some() || self.time.is_some() || self.error.is_some();
+            if other || self.adaptive {
+                let message = "numbers say which samples are taken: spp, time, error and adaptive can't be given with them";
+                return Err(Error::Input(message.into()));
+            }
+        }
         within(
             "max_depth",
             self.max_depth.map(u64::from),
@@ -193,23 +207,6 @@ impl Options {
             integrator: self.integrator,
             light_paths: self.light_paths,
         }
-    }
-
-    /// The pixels to render, within a picture of `size`.
-    fn rects(&self, size: [u32; 2]) -> Result<Vec<Rect>, Error> {
-        let whole = Rect::whole(size);
-        if self.regions.is_empty() {
-            return Ok(vec![whole]);
-        }
-        let [width, height] = size;
-        for r in &self.regions {
-            if r.area() == 0 || r.union(&whole) != whole {
-                return Err(Error::Input(format!(
-                    "region {r} is empty or reaches out of the picture of {width}x{height} pixels"
-                )));
-            }
-        }
-        Ok(self.regions.clone())
     }
 }
 
@@ -274,60 +271,9 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
 pub fn render_with(
     scene: &Scene,
     options: &Options,
-    mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
+    watch: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Picture, Error> {
-    options.check()?;
-    let (scene, text) = scene::checked(scene).map_err(Error::Scene)?;
-    let settings = Settings::resolve(&scene, &options.overrides());
-    let regions = options.rects(settings.size)?;
-    let bounds = plan::bounds(&regions);
-    memory::check(bounds.area(), settings.may_trace_light(&scene))?;
-    let ordered = Canonical::new(&scene);
-    let mut before = Provenance::of(&ordered, text, &settings);
-    let world = World::of(&ordered, settings.size);
-    let mut film = Film::new(settings.size, bounds, settings.strata);
-    film.pilot = options.adaptive.then(|| Pilot::new(&regions));
-    let adapter = options.adapter.as_deref();
-    let mut chosen = backend::choose(options.backend, adapter, &world, &settings, |_| ())?;
-    before.settings.light_paths = chosen.engine.light_paths().is_some();
-    let ends = options.time.is_some() || options.error.is_some();
-    let unless_told = if ends { MAX_SAMPLES } else { DEFAULT_SPP };
-    let on_cpu = chosen.engine.device().backend == "cpu";
-    let hurried = (on_cpu && !ends && options.spp.is_none()).then_some(CPU_TIME);
-    let job = Job {
-        tiles: run::tiles(&regions, chosen.tile_pixels),
-        samples: 0..options.spp.unwrap_or(unless_told),
-        round: settings.round(),
-        time: options.time.or(hurried),
-        error: options.error,
-        black: before.black,
-        call: run::CALL,
-        adaptive: options.adaptive.then_some(settings.seed),
-    };
-    let device = chosen.engine.device().clone();
-    let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &options.stop);
-    // What ends it besides the engine is `watch`, and that is no error.
-    let ended = run.go(|film, tally| {
-        match watch(&Progress {
-            film,
-            tally,
-            black: before.black,
-        }) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(None::<EngineError>),
-        }
-    });
-    let tally = run.tally;
-    let ended = match ended {
-        Ok(reason) => reason,
-        Err(None) => StopReason::Interrupted,
-        Err(Some(e)) => return Err(Error::Device(e.to_string())),
-    };
-    if film.coverage.is_empty() {
-        return Err(Error::Stopped);
-    }
-    let provenance = provenance(&before, &device, &film, &tally);
-    Ok(Picture::new(film, provenance, ended, chosen.note))
+    renderer::render(None, None, scene, options, watch)
 }
 
 /// The provenance of `film`, which a run on `device` has brought on from `before`.

@@ -1,9 +1,10 @@
 //! A finished picture with what is known of it.
 
 use super::Error;
-use crate::compare::{self, Comparison, Limits, compare};
+use crate::compare::{Comparison, Limits, Side, compare};
+use crate::files::FileError;
 use crate::film::error::RelativeError;
-use crate::film::{Estimate, Film};
+use crate::film::{self, Estimate, Film};
 use crate::output::{Format, Pixels, WriteOptions, store, write_png};
 use crate::provenance::Provenance;
 use crate::run::StopReason;
@@ -14,7 +15,7 @@ use std::path::Path;
 pub struct Picture {
     film: Film,
     provenance: Provenance,
-    ended: StopReason,
+    ended: Option<StopReason>,
     note: Option<String>,
     pixels: Vec<[f32; 3]>,
     errors: Vec<[f32; 3]>,
@@ -25,7 +26,7 @@ impl Picture {
     pub(super) fn new(
         film: Film,
         provenance: Provenance,
-        ended: StopReason,
+        ended: Option<StopReason>,
         note: Option<String>,
     ) -> Self {
         let [width, height] = film.size;
@@ -47,6 +48,22 @@ impl Picture {
             ended,
             note,
         }
+    }
+
+    /// Reads a film (`.npz`): one that [`save`](Self::save) or the program has written. It is what
+    /// [`Renderer::resume`](crate::Renderer::resume) and [`merge`](crate::merge) take.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let (film, mut provenance) = store::load(path.as_ref())?;
+        if film.coverage.is_empty() {
+            return Err(FileError::content(path.as_ref(), "the film has no samples").into());
+        }
+        provenance.describe(&film);
+        Ok(Self::new(film, provenance, None, None))
+    }
+
+    /// What it is made of.
+    pub(super) fn into_parts(self) -> (Film, Provenance) {
+        (self.film, self.provenance)
     }
 
     /// Width and height in pixels.
@@ -80,8 +97,8 @@ impl Picture {
         &self.provenance
     }
 
-    /// What ended the rendering.
-    pub fn ended(&self) -> StopReason {
+    /// What ended the rendering; `None` if it was [read from a file](Self::open) or [merged](crate::merge).
+    pub fn ended(&self) -> Option<StopReason> {
         self.ended
     }
 
@@ -127,10 +144,47 @@ impl Picture {
     /// for equal numbers of samples and different seeds.
     pub fn compare(&self, reference: &Picture) -> Result<Comparison, Error> {
         let to_compare = |name: &str, p: &Picture| {
-            compare::Picture::from_film(name.into(), &p.film, &p.provenance).map_err(Error::Input)
+            Side::from_film(name.into(), &p.film, &p.provenance).map_err(Error::Input)
         };
         let reference = to_compare("the reference", reference)?;
         let picture = to_compare("the picture", self)?;
         compare(&reference, &picture, &Limits::default()).map_err(|e| Error::Input(e.to_string()))
     }
+}
+
+/// Adds up pictures of one scene with the same settings and different samples: those of other [numbers](crate::Options::numbers), or
+/// of other regions. The order does not matter.
+///
+/// ```
+/// use etendue::{Backend, Options, Scene};
+///
+/// let scene = Scene::builder()
+///     .camera([0.0, 1.0, 4.0], [0.0, 0.5, 0.0], 40.0, [16, 12])
+///     .diffuse("white", [0.8; 3])
+///     .sphere([0.0, 0.5, 0.0], 0.5, "white")
+///     .light([0.0, 3.0, 1.0], [0.0, -1.0, 0.0], 0.5, [20.0; 3])
+///     .build()?;
+/// let part = |numbers| {
+///     let options = Options { numbers: Some(numbers), backend: Backend::Cpu, ..Options::default() };
+///     etendue::render(&scene, &options)
+/// };
+/// let picture = etendue::merge(vec![part(0..8)?, part(8..16)?])?;
+/// assert_eq!(picture.samples()[0], 16);
+/// # Ok::<(), etendue::Error>(())
+/// ```
+pub fn merge(pictures: Vec<Picture>) -> Result<Picture, Error> {
+    let mut parts: Vec<_> = pictures.into_iter().map(Picture::into_parts).collect();
+    parts.sort_by_key(|(film, _)| film.coverage.first());
+    let refused = |why: String| Error::Input(format!("the pictures cannot be merged: {why}"));
+    let mut parts = parts.into_iter();
+    let Some((mut film, mut provenance)) = parts.next() else {
+        return Err(refused("there are none".into()));
+    };
+    for (other, its) in parts {
+        provenance.same_samples(&its).map_err(refused)?;
+        film::merge::merge(&mut film, &other).map_err(|e| refused(e.to_string()))?;
+        provenance.absorb(&its);
+    }
+    provenance.describe(&film);
+    Ok(Picture::new(film, provenance, None, None))
 }

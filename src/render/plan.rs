@@ -1,11 +1,27 @@
 //! Which samples bring the pixels of some regions to a number of them.
 
+use crate::film::Film;
 use crate::film::coverage::{Coverage, Rect};
 use std::ops::Range;
 
 /// The smallest rectangle around all regions, of which there is at least one.
 pub fn bounds(regions: &[Rect]) -> Rect {
     regions[1..].iter().fold(regions[0], |a, b| a.union(b))
+}
+
+/// The regions that a film holds, if it is no film of the whole picture: those that it is resumed with.
+pub fn held_regions(film: &Film) -> Vec<Rect> {
+    if film.bounds == Rect::whole(film.size) {
+        return Vec::new();
+    }
+    let cells: Vec<Rect> = film.coverage.cells().map(|c| c.0).collect();
+    // If the first run ended before all regions had samples, the film knows only the rectangle around them.
+    let all_begun = cells.iter().copied().reduce(|a, b| a.union(&b)) == Some(film.bounds);
+    match &film.pilot {
+        Some(pilot) => pilot.regions().to_vec(),
+        None if all_begun => Rect::disjoint(&cells),
+        None => vec![film.bounds],
+    }
 }
 
 /// The end of the range from 0 that brings every pixel to `wanted` samples, those included that it holds beyond.

@@ -1,4 +1,6 @@
 use super::*;
+use crate::film::coverage::Rect;
+use crate::run::StopReason;
 use std::sync::atomic::Ordering;
 
 fn scene() -> Scene {
@@ -32,7 +34,7 @@ fn a_picture_says_what_it_shows_and_how_it_came_about() {
     let picture = render(&scene(), &cpu()).unwrap();
     assert_eq!((picture.size(), picture.pixels().len()), ([16, 12], 192));
     assert_eq!(picture.samples(), [16; 192]);
-    assert_eq!(picture.ended(), StopReason::Samples);
+    assert_eq!(picture.ended(), Some(StopReason::Samples));
     let provenance = picture.provenance();
     assert_eq!(
         (provenance.samples, provenance.counters.paths),
@@ -63,7 +65,7 @@ fn each_stop_condition_ends_it() {
         ..cpu()
     };
     let picture = render(&scene(), &by_error).unwrap();
-    assert_eq!(picture.ended(), StopReason::Error);
+    assert_eq!(picture.ended(), Some(StopReason::Error));
     assert!(picture.provenance().samples < 10_000.0);
     let by_time = Options {
         spp: None,
@@ -72,7 +74,7 @@ fn each_stop_condition_ends_it() {
     };
     assert_eq!(
         render(&scene(), &by_time).unwrap().ended(),
-        StopReason::Time
+        Some(StopReason::Time)
     );
 
     let mut heard = 0;
@@ -82,7 +84,7 @@ fn each_stop_condition_ends_it() {
         ControlFlow::Break(())
     });
     let broken = broken.unwrap();
-    assert_eq!((heard, broken.ended()), (1, StopReason::Interrupted));
+    assert_eq!((heard, broken.ended()), (1, Some(StopReason::Interrupted)));
     assert!(broken.samples()[0] >= 1);
 
     let stopped = cpu();
@@ -232,7 +234,7 @@ fn pictures_are_saved_by_the_ending_of_their_name() {
     for name in ["a.exr", "a.png", "a.npz"] {
         let path = folder.path().join(name);
         picture.save(&path).unwrap();
-        let read = crate::compare::Picture::read(&path).unwrap();
+        let read = crate::compare::Side::read(&path).unwrap();
         assert_eq!(read.size, [16, 12], "{name}");
     }
     picture.save_png(folder.path().join("b.png"), 1.0).unwrap();
@@ -248,4 +250,146 @@ fn pictures_are_saved_by_the_ending_of_their_name() {
     assert!(matches!(picture.save("x.tiff"), Err(Error::Input(_))));
     let nowhere = folder.path().join("none").join("a.exr");
     assert!(matches!(picture.save(nowhere), Err(Error::File(_))));
+}
+
+#[test]
+fn a_picture_that_is_brought_on_has_the_bits_of_one_that_was_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let seed = Some(7);
+    let whole = render(
+        &scene(),
+        &Options {
+            spp: Some(600),
+            seed,
+            ..cpu()
+        },
+    )
+    .unwrap();
+    let begun = render(
+        &scene(),
+        &Options {
+            spp: Some(100),
+            seed,
+            ..cpu()
+        },
+    )
+    .unwrap();
+    begun.save(&path).unwrap();
+    let renderer = Renderer::open(&cpu()).unwrap();
+    // The seed is the picture's own.
+    let more = Options {
+        spp: Some(600),
+        ..cpu()
+    };
+    let read = Picture::open(&path).unwrap();
+    assert_eq!((read.ended(), read.pixels()), (None, begun.pixels()));
+    let done = renderer.resume(read, &scene(), &more).unwrap();
+    assert_eq!(done.film(), whole.film());
+    assert_eq!(done.provenance().counters.paths, 600 * 192);
+    // It has all of them already.
+    let same = renderer.resume(done.clone(), &scene(), &more).unwrap();
+    assert_eq!(same.film(), whole.film());
+    assert_eq!(same.ended(), Some(StopReason::Samples));
+    let refused =
+        |options: Options, scene: &Scene| match renderer.resume(done.clone(), scene, &options) {
+            Err(Error::Input(why)) => why,
+            other => panic!("{other:?}"),
+        };
+    let why = refused(
+        Options {
+            seed: Some(8),
+            ..more.clone()
+        },
+        &scene(),
+    );
+    assert!(
+        why.ends_with("picture and options: seed is 7 and 8"),
+        "{why}"
+    );
+    let why = refused(
+        Options {
+            adaptive: true,
+            ..more.clone()
+        },
+        &scene(),
+    );
+    assert!(why.contains("is not adaptive"), "{why}");
+    let mut other = scene();
+    other.lights[0].radius = 0.25;
+    let why = refused(more.clone(), &other);
+    assert!(why.contains("scene is \"untitled\""), "{why}");
+}
+
+#[test]
+fn parts_of_a_picture_are_brought_on_and_merged() {
+    let half = |x0: u32, spp: u64| {
+        let regions = vec![Rect {
+            x0,
+            y0: 0,
+            x1: x0 + 8,
+            y1: 12,
+        }];
+        render(
+            &scene(),
+            &Options {
+                regions,
+                spp: Some(spp),
+                ..cpu()
+            },
+        )
+        .unwrap()
+    };
+    let (left, right) = (half(0, 512), half(8, 256));
+    let renderer = Renderer::open(&cpu()).unwrap();
+    let right = renderer
+        .resume(
+            right,
+            &scene(),
+            &Options {
+                spp: Some(512),
+                ..cpu()
+            },
+        )
+        .unwrap();
+    assert_eq!(
+        right.film().bounds,
+        Rect {
+            x0: 8,
+            y0: 0,
+            x1: 16,
+            y1: 12
+        }
+    );
+    let both = merge(vec![right, left.clone()]).unwrap();
+    let whole = render(
+        &scene(),
+        &Options {
+            spp: Some(512),
+            ..cpu()
+        },
+    )
+    .unwrap();
+    assert_eq!(both.pixels(), whole.pixels());
+    let why = merge(vec![both, left]).unwrap_err().to_string();
+    assert!(
+        why.contains("samples 0..512 of pixels 0,0,8,12 are in both films"),
+        "{why}"
+    );
+    assert!(merge(Vec::new()).is_err());
+
+    let numbers = |numbers| Options {
+        numbers: Some(numbers),
+        spp: None,
+        ..cpu()
+    };
+    let part = |from: u64| render(&scene(), &numbers(from..from + 256)).unwrap();
+    let both = merge(vec![part(256), part(0)]).unwrap();
+    assert_eq!(both.pixels(), whole.pixels());
+    assert!(refusal(numbers(5..5)).contains("must end after they start"));
+    let twice = Options {
+        time: Some(Duration::from_secs(1)),
+        ..numbers(0..4)
+    };
+    assert!(refusal(twice).contains("can't be given with them"));
 }
