@@ -2,6 +2,8 @@
 
     against_mitsuba.py PROGRAM FOLDER                     every scene of scenes/ without Phong, exported, rendered, compared
     against_mitsuba.py PROGRAM FOLDER --false-alarms N    N pairs of Mitsuba's own pictures of three scenes: how often they differ
+    against_mitsuba.py PROGRAM FOLDER --z-test N          N pictures of changed lamps: what the test passes that Mitsuba's own renders are
+                                                          held against their references with, and what `etendue compare` passes
     ... --moments                                         the same with one render of a side, which states its variance
 
 Without --moments every side has independent renders, whose spread is its noise. Exit status 1 if a scene differs.
@@ -9,11 +11,14 @@ Without --moments every side has independent renders, whose spread is its noise.
 
 import argparse
 import json
+import math
 import pathlib
+import re
 import subprocess
 import sys
 
 import mitsuba as mi
+import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 SIZE = "64x48"
@@ -24,6 +29,8 @@ RENDERS, SAMPLES = 8, 64
 PAIR_RENDERS, PAIR_SAMPLES = 4, 16
 # Samples per pixel with --moments.
 MOMENT_SAMPLES = 64
+# Samples of a picture in Mitsuba's own test, and per pixel of the reference, of which it has 32 000.
+Z_BUDGET, Z_REFERENCE = 2_000_000, 4096
 PAIR_SCENES = ["diffuse", "three_materials", "caustic"]
 
 
@@ -106,11 +113,66 @@ def false_alarms(program, folder, pairs, moments):
     return 0
 
 
+def channels(path, layer):
+    """X, Y and Z of a layer of an EXR file."""
+    picture = mi.Bitmap(str(path))
+    names = [field.name for field in picture.struct_()]
+    return np.array(picture).astype(float)[..., [names.index(f"{layer}.{c}") for c in "XYZ"]]
+
+
+def passes_z_test(picture, samples, reference):
+    """The verdict of Mitsuba's own regression test (src/render/tests/test_renders.py): each channel of each pixel by a z-test that takes
+    the reference for noiseless, with the reference's variance of a sample; 99.75 % of them must pass at 0.01, corrected for their number.
+    """
+    mean, known = (channels(path, "path") for path in (picture, reference))
+    variance = np.maximum(channels(reference, "m2_path") - known**2, 1e-4)
+    z = np.abs(mean - known) * np.sqrt(samples / variance)
+    alpha = 1 - (1 - 0.01) ** (1 / mean[..., 0].size)
+    p = np.vectorize(math.erfc)(z / math.sqrt(2))
+    return np.count_nonzero(p > alpha) / 3 >= 0.9975 * mean[..., 0].size
+
+
+def z_test(program, folder, count):
+    """What two tests pass of Mitsuba's pictures of `diffuse` with its lamps changed, and with pixels blackened."""
+    xml = export(program, ROOT / "scenes/diffuse.toml", folder)
+    samples = Z_BUDGET // (64 * 48)
+
+    def shot(name, seed, samples, brightness=1.0):
+        scene = folder / "changed.xml"
+        radiance = lambda m: m[1] + " ".join(str(float(v) * brightness) for v in m[2].split()) + '"'
+        scene.write_text(re.sub(r'(name="radiance" value=")([^"]*)"', radiance, xml.read_text()))
+        return render_moments(scene, seed, samples, folder / name)
+
+    def verdicts(picture, reference, of_reference):
+        theirs = passes_z_test(picture, samples, reference)
+        flags = [f"--spp-a={of_reference}", f"--spp-b={samples}"]
+        return np.array([theirs, compare(program, [reference], [picture], *flags)["same"]], int)
+
+    def tell(what, passed, of):
+        print(f"{what}: of {of} the z-test passes {passed[0]}, etendue compare {passed[1]}", flush=True)
+
+    reference = shot("reference.exr", 1, Z_REFERENCE)
+    for brightness in [1.0, 1.01, 1.03, 1.1]:
+        pictures = (shot("changed.exr", 100 + k, samples, brightness) for k in range(count))
+        tell(f"lamps x {brightness}", sum(verdicts(p, reference, Z_REFERENCE) for p in pictures), count)
+    pairs = ((shot("changed.exr", 100 + k, samples), shot("short.exr", 500 + k, samples)) for k in range(count))
+    tell("unchanged, reference of as many samples", sum(verdicts(p, r, samples) for p, r in pairs), count)
+    picture = mi.Bitmap(str(shot("changed.exr", 100, samples)))
+    for black in [4, 7, 8]:
+        array = np.array(picture, copy=True)
+        array[5, 20 : 20 + black] = 0
+        names = [field.name for field in picture.struct_()]
+        mi.Bitmap(array, mi.Bitmap.PixelFormat.MultiChannel, names).write(str(folder / "black.exr"))
+        tell(f"{black} black pixels", verdicts(folder / "black.exr", reference, Z_REFERENCE), 1)
+    return 0
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--false-alarms", type=int, metavar="N")
+    parser.add_argument("--z-test", type=int, metavar="N")
     parser.add_argument("--moments", action="store_true")
     args = parser.parse_args()
     # It needs no LLVM.
@@ -118,6 +180,8 @@ def main():
     args.folder.mkdir(parents=True, exist_ok=True)
     if args.false_alarms:
         return false_alarms(args.program, args.folder, args.false_alarms, args.moments)
+    if args.z_test:
+        return z_test(args.program, args.folder, args.z_test)
     return against_ours(args.program, args.folder, args.moments)
 
 
