@@ -4,10 +4,11 @@ use super::args::InfoArgs;
 use super::failure::Failure;
 use crate::film::coverage::Rect;
 use crate::output::{
-    Kind, entries, read_exr, read_exr_header, read_image, read_png, read_png_header, store,
+    Kind, NUMBERS, entries, read_exr, read_exr_header, read_image, read_png, read_png_header, store,
 };
 use crate::stats::percent;
 use serde::Serialize;
+use serde_json::Value;
 use std::path::Path;
 
 /// What a file says of itself.
@@ -43,8 +44,15 @@ struct FilmInfo {
     scene_text: String,
 }
 
+/// Numbers are numbers, also where a header has them as text.
 fn as_map<S: serde::Serializer>(entries: &[(String, String)], to: S) -> Result<S::Ok, S::Error> {
-    to.collect_map(entries.iter().map(|(key, value)| (key, value)))
+    let value = |key: &str, text: &str| {
+        let number = NUMBERS
+            .contains(&key)
+            .then(|| serde_json::from_str(text).ok());
+        number.flatten().unwrap_or_else(|| Value::from(text))
+    };
+    to.collect_map(entries.iter().map(|(k, v)| (k, value(k, v))))
 }
 
 /// Prints what the file says, as lines or as JSON.

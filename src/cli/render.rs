@@ -15,6 +15,7 @@ use super::{ending, plan};
 use crate::engine::DeviceInfo;
 use crate::files::FileError;
 use crate::files::lock::Lock;
+use crate::files::room;
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::film::error::{Doubt, RelativeError};
@@ -27,13 +28,17 @@ use crate::output::report::{self, Report, Seconds};
 use crate::output::store;
 use crate::provenance::Provenance;
 use crate::render::backend::{self, Chosen};
-use crate::render::{self, memory};
+use crate::render::memory::{self, Need};
+use crate::render::plan::bounds as bounds_of;
 use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::{Canonical, Scene, check, parse};
 use crate::settings::{Changed, Settings};
 use crate::world::World;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Bytes that a pixel may take in a picture: nine channels of four bytes, which compression seldom makes more of.
+const PICTURE_BYTES: u64 = 36;
 
 /// Seconds of rendering beside which a trial of each light is nothing.
 const TRIAL_PAYS: f64 = 5.0;
@@ -94,13 +99,19 @@ fn render_before(
         None => Settings::resolve(&scene, &args.overrides()),
     };
     let regions = plan::regions(args, &settings)?;
-    let bounds = render::plan::bounds(&regions);
+    let bounds = bounds_of(&regions);
     let things = plan::things(&scene);
     stages.begin(format!("sorting {things}"));
     let ordered = Canonical::new(&scene);
     stages.begin(format!("hashing {things}"));
     let new = Provenance::of(&ordered, text, &settings);
     stages.end();
+    memory::check_need(Need {
+        pixels: bounds.area(),
+        light_paths: settings.may_trace_light(&scene),
+        film: old.is_none(),
+        shown: args.listen.is_some() || args.tev.is_some(),
+    })?;
     let (mut film, mut provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
             check_same_samples(args, path, &held, &new)?;
@@ -109,7 +120,6 @@ fn render_before(
             (film, held)
         }
         _ => {
-            memory::check(bounds.area(), settings.may_trace_light(&scene))?;
             let mut film = Film::new(settings.size, bounds, settings.strata);
             film.pilot = args.adaptive.then(|| Pilot::new(&regions));
             (film, new)
@@ -165,6 +175,7 @@ fn render_before(
     {
         say!("{note}");
     }
+    say_little_room(args, outputs, &film);
     say_suspect(args, &scene, &settings, chosen.engine.device());
     if !args.talk.quiet {
         say_start(args, &settings, &chosen, &job, &film)?;
@@ -192,11 +203,14 @@ fn render_before(
 
     // Save the film however the run ended. Write pictures only if the run did not fail, but even if the film could not be
     // saved: then they are the only result.
+    stages.begin("looking at every pixel");
     let provenance = saver.provenance(&film, &tally);
     let mut written = Written::default();
     if let Some(path) = args.film.as_ref().filter(|_| tally.counters.paths > 0) {
+        stages.begin(format!("saving {}", path.display()));
         written.note(path, store::save(path, &film, &provenance));
     }
+    stages.end();
     let reason = match ended {
         Ok(reason) => reason,
         Err(failure) => {
@@ -208,11 +222,13 @@ fn render_before(
         for path in outputs.iter().chain(&args.watch) {
             let format = Format::from_path(path).map_err(Failure::Input)?;
             let options = args.pictures.options();
+            stages.begin(format!("writing {}", path.display()));
             written.note(path, format.write(path, &film, &provenance, &options));
         }
     }
-    // This looks at every pixel.
+    stages.begin("looking at every pixel");
     let error = provenance.error(&film);
+    stages.end();
     events::emit(&ended_so(stop_reason(args, reason), &tally, &error), true);
     if let Some(path) = &args.report {
         let facts = report::Run {
@@ -371,6 +387,30 @@ fn other_light_paths(args: &RenderArgs, film: &Film) -> Failure {
     };
     let path = args.film.clone().unwrap_or_default();
     FileError::content(&path, format!("this film can't be resumed here: {advice}")).into()
+}
+
+/// A warning for every disk that has too little room for what is written to it at the end. Others may use it until then, and files are
+/// written beside those that they replace.
+fn say_little_room(args: &RenderArgs, outputs: &[PathBuf], film: &Film) {
+    let pixels = film.bounds.area();
+    let whole = u64::from(film.size[0]) * u64::from(film.size[1]);
+    let films = args
+        .film
+        .iter()
+        .map(|path| (path, pixels * store::pixel_bytes(film)));
+    let pictures = outputs.iter().map(|path| (path, whole * PICTURE_BYTES));
+    for (path, needed) in films.chain(pictures) {
+        // Devices take anything.
+        let is_file = std::fs::metadata(path).map_or(true, |m| m.is_file());
+        if let Some(free) = room::free(path).filter(|free| is_file && *free < needed) {
+            say!(
+                "warning: {}: there is room for {:.1} MB, and it may take {:.1} MB at the end",
+                path.display(),
+                free as f64 / 1e6,
+                needed as f64 / 1e6
+            );
+        }
+    }
 }
 
 /// What is suspect about the scene: in full where it changes the picture, by number where it does not.

@@ -46,5 +46,8 @@ fn text(page: &Man) -> String {
     let mut text = Vec::new();
     // Memory takes it.
     let _ = page.render(&mut text);
-    String::from_utf8_lossy(&text).into_owned()
+    // What stands after the help begins with examples.
+    String::from_utf8_lossy(&text)
+        .replace(".SH EXTRA\nExamples:\n", ".SH EXAMPLES\n")
+        .replace(".SH EXTRA\nExample:\n", ".SH EXAMPLES\n")
 }

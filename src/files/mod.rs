@@ -5,6 +5,7 @@ mod error;
 pub mod kind;
 pub mod lock;
 mod resolve;
+pub mod room;
 
 pub(crate) use error::reason;
 pub use error::{FileError, open};

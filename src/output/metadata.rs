@@ -19,6 +19,19 @@ impl std::fmt::Display for Value {
     }
 }
 
+/// The keys whose values are numbers.
+pub const NUMBERS: [&str; 9] = [
+    "samples",
+    "replicates",
+    "seed",
+    "strata",
+    "max_depth",
+    "shadow_rays",
+    "seconds",
+    "relative_error",
+    "relative_error_uncertainty",
+];
+
 /// Keys and values, in a fixed order. Unknown values, such as a missing title or relative error, are left out.
 pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
     let text = |s: &str| Some(Value::Text(s.into()));
@@ -65,4 +78,22 @@ pub fn entries(p: &Provenance) -> Vec<(&'static str, Value)> {
     all.into_iter()
         .filter_map(|(key, value)| Some((key, value?)))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::provenance::tests::example;
+
+    #[test]
+    fn numbers_are_known_by_their_keys() {
+        let mut all = example([4, 3]);
+        (all.relative_error, all.relative_error_uncertainty) = (Some(0.5), Some(0.25));
+        let numbers: Vec<&str> = entries(&all)
+            .iter()
+            .filter(|(_, value)| matches!(value, Value::Number(_)))
+            .map(|(key, _)| *key)
+            .collect();
+        assert_eq!(numbers, NUMBERS);
+    }
 }

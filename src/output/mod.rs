@@ -16,7 +16,7 @@ pub use exr::{CHANNELS, channel_values, write_exr};
 pub use exr_read::{ExrHeader, Picture, read_exr, read_exr_header};
 pub use exr_stated::Moments;
 pub use image_read::{Image, read_image};
-pub(crate) use metadata::entries;
+pub(crate) use metadata::{NUMBERS, entries};
 pub(crate) use pixels::Pixels;
 pub use png::write_png;
 pub use png_read::{PngHeader, read_png, read_png_header};

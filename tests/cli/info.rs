@@ -46,10 +46,19 @@ fn films_and_pictures_say_the_same_of_themselves() {
         "adapter",
         "light",
     ] {
-        assert!(film[key].is_string(), "{key}");
+        let is_number = ["seed", "samples", "replicates"].contains(&key);
+        assert_eq!(
+            (film[key].is_number(), film[key].is_string()),
+            (is_number, !is_number),
+            "{key}"
+        );
         assert_eq!(film[key], exr[key], "{key}");
         assert_eq!(film[key], png[key], "{key}");
     }
+    assert_eq!(
+        (&film["seed"], &film["samples"]),
+        (&Value::from(7), &Value::from(16))
+    );
 }
 
 #[test]
