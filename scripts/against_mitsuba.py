@@ -2,7 +2,7 @@
 
     against_mitsuba.py PROGRAM FOLDER                     every scene of scenes/ without Phong, exported, rendered, compared
     against_mitsuba.py PROGRAM FOLDER --false-alarms N    N pairs of Mitsuba's own pictures of three scenes: how often they differ
-    against_mitsuba.py PROGRAM FOLDER --z-test N          N pictures of changed lamps: what the test passes that Mitsuba's own renders are
+    against_mitsuba.py PROGRAM FOLDER --z-test N          N pictures of darker walls: what the test passes that Mitsuba's own renders are
                                                           held against their references with, and what `etendue compare` passes
     ... --moments                                         the same with one render of a side, which states its variance
 
@@ -133,14 +133,14 @@ def passes_z_test(picture, samples, reference):
 
 
 def z_test(program, folder, count):
-    """What two tests pass of Mitsuba's pictures of `diffuse` with its lamps changed, and with pixels blackened."""
+    """What two tests pass of Mitsuba's pictures of `diffuse` with its walls darker, and with pixels blackened."""
     xml = export(program, ROOT / "scenes/diffuse.toml", folder)
     samples = Z_BUDGET // (64 * 48)
 
-    def shot(name, seed, samples, brightness=1.0):
+    def shot(name, seed, samples, share=1.0):
         scene = folder / "changed.xml"
-        radiance = lambda m: m[1] + " ".join(str(float(v) * brightness) for v in m[2].split()) + '"'
-        scene.write_text(re.sub(r'(name="radiance" value=")([^"]*)"', radiance, xml.read_text()))
+        darker = lambda m: m[1] + " ".join(str(float(v) * share) for v in m[2].split()) + '"'
+        scene.write_text(re.sub(r'(name="reflectance" value=")([^"]*)"', darker, xml.read_text()))
         return render_moments(scene, seed, samples, folder / name)
 
     def verdicts(picture, reference, of_reference):
@@ -152,9 +152,9 @@ def z_test(program, folder, count):
         print(f"{what}: of {of} the z-test passes {passed[0]}, etendue compare {passed[1]}", flush=True)
 
     reference = shot("reference.exr", 1, Z_REFERENCE)
-    for brightness in [1.0, 1.01, 1.03, 1.1]:
-        pictures = (shot("changed.exr", 100 + k, samples, brightness) for k in range(count))
-        tell(f"lamps x {brightness}", sum(verdicts(p, reference, Z_REFERENCE) for p in pictures), count)
+    for share in [1.0, 0.99, 0.98, 0.97]:
+        pictures = (shot("changed.exr", 100 + k, samples, share) for k in range(count))
+        tell(f"reflectances x {share}", sum(verdicts(p, reference, Z_REFERENCE) for p in pictures), count)
     pairs = ((shot("changed.exr", 100 + k, samples), shot("short.exr", 500 + k, samples)) for k in range(count))
     tell("unchanged, reference of as many samples", sum(verdicts(p, r, samples) for p, r in pairs), count)
     picture = mi.Bitmap(str(shot("changed.exr", 100, samples)))

@@ -5,13 +5,25 @@ use super::failure::Failure;
 use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::{say, write_stdout};
-use crate::compare::{LABELS, Limits, Side, compare as compare_pictures, html};
+use crate::compare::{Incomparable, LABELS, Limits, Side, compare as compare_pictures, html};
 use crate::files::atomic;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Read one picture, read the other, compare them.
 const STEPS: usize = 3;
+
+/// Why two pictures can't be compared, and what to type.
+fn advised(why: &Incomparable) -> String {
+    let advice = match why {
+        Incomparable::NoNoise { .. } => {
+            ": use --max-flip or --max-relative-rmse. Pictures of other programs state it by several renders (--a, --b), or by \
+             variances with --spp-a or --spp-b"
+        }
+        Incomparable::Size { .. } | Incomparable::Regions { .. } => "",
+    };
+    format!("{why}{advice}")
+}
 
 /// Prints the comparison. The exit status is 1 if the pictures differ.
 pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
@@ -41,7 +53,7 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
         max_relative_rmse: args.max_relative_rmse,
     };
     let mut comparison =
-        compare_pictures(&a, &b, &limits).map_err(|e| Failure::Input(e.to_string()))?;
+        compare_pictures(&a, &b, &limits).map_err(|e| Failure::Input(advised(&e)))?;
     match &sides {
         [a, b] if a.len() == 1 && b.len() == 1 => {
             if is_same_file(&a[0], &b[0]) {

@@ -91,8 +91,7 @@ pub enum Incomparable {
     /// No verdict is possible, and there are no limits.
     #[error(
         "{name} does not state its noise (it has no error layers, no sample counts, or fewer than two replicates), so a \
-         limit is needed: use --max-flip or --max-relative-rmse. Pictures of other programs state it by several renders (--a, --b), \
-         or by variances with --spp-a or --spp-b"
+         limit is needed"
     )]
     NoNoise {
         /// The picture without error layers.

@@ -236,6 +236,7 @@ fn make_scene_does_not_replace_an_edited_file() {
         ("few.toml", "make-scene spheres --count 3 -o few.toml"),
         ("many.csv", "make-scene spheres --count 300 -o many.toml"),
         ("cloud.csv", "make-scene cloud --count 300"),
+        ("particles.xyz", "make-scene particles --count 3"),
     ] {
         bench.run(command).success();
         let made = fs::read(bench.path(name)).unwrap();

@@ -359,48 +359,48 @@ fn what_rows_look_like_is_said_once() {
     for (keys, message) in [
         (
             "material = 'white'\ncolor = { column = 'q', map = 'viridis' }",
-            "81:9: material and color both say what the rows look like; give one of them",
+            "67:9: material and color both say what the rows look like; give one of them",
         ),
         (
             "color = { column = 'q', map = 'viridi' }",
-            "80:31: map is 'viridi'; map must be the name of a colour map: viridis, plasma,",
+            "66:31: map is 'viridi'; map must be the name of a colour map: viridis, plasma,",
         ),
         (
             "color = { colum = 'q', map = 'viridis' }",
-            "80:9: missing key column in color of [[spheres]]; it must be a string",
+            "66:9: missing key column in color of [[spheres]]; it must be a string",
         ),
         (
             "color = { column = 'q', map = 'reds', low = 2, high = 1.5 }",
-            "80:55: high is 1.5, but must be above low, 2",
+            "66:55: high is 1.5, but must be above low, 2",
         ),
         (
             "color = 'viridis'",
-            "80:9: color is 'viridis', but must be a table",
+            "66:9: color is 'viridis', but must be a table",
         ),
         (
             "species.O = { radius = 0 }",
-            "80:24: radius is 0; radius must be a number from 1e-15 to 1e15",
+            "66:24: radius is 0; radius must be a number from 1e-15 to 1e15",
         ),
         (
             "species.O = 'red'",
-            "80:13: species.O is 'red', but must be a table",
+            "66:13: species.O is 'red', but must be a table",
         ),
-        ("species = {}", "80:11: species is empty"),
+        ("species = {}", "66:11: species is empty"),
         (
             "species.O = { radius = 1, material = 'white', reflectance = [1, 0, 0] }",
-            "80:38: reflectance and material both say what a species looks like",
+            "66:38: reflectance and material both say what a species looks like",
         ),
         (
             "species.O = { radius = 1 }\nspecies.H = { reflectance = [1, 1, 1] }",
-            "80:",
+            "66:",
         ),
         (
             "radius = 2\nspecies.O = { radius = 1 }",
-            "80:10: radius and species both say how large the rows are",
+            "66:10: radius and species both say how large the rows are",
         ),
         (
             "frame = 2",
-            "80:9: frame chooses among those of an .xyz file",
+            "66:9: frame chooses among those of an .xyz file",
         ),
     ] {
         let text = format!("{FULL}[[spheres]]\nfile = 'none.csv'\n{keys}\n");
