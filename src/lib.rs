@@ -65,6 +65,8 @@ pub mod gpu;
 #[doc(hidden)]
 pub mod kernel;
 #[doc(hidden)]
+pub mod layers;
+#[doc(hidden)]
 pub mod output;
 #[doc(hidden)]
 pub mod provenance;
@@ -90,6 +92,9 @@ pub mod bench;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod cli;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod denoise;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod export;

@@ -12,6 +12,7 @@ pub use watch::{PlotArgs, WatchArgs};
 
 use super::bench::args::BenchArgs;
 use super::values;
+use crate::layers::Layer;
 use crate::output::{ExrChannels, WriteOptions};
 use crate::scene::generate::MOST_IN_TABLES;
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -116,7 +117,7 @@ pub struct Talk {
 }
 
 /// How a command writes pictures.
-#[derive(Debug, Clone, Copy, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct PictureArgs {
     /// Exposure of PNG pictures in stops, applied before the sRGB curve
     #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = values::exposure,
@@ -125,6 +126,22 @@ pub struct PictureArgs {
     /// Channels of EXR pictures: all of them, with errors and samples, or R, G and B alone, for programs that don't know layers
     #[arg(long, value_enum, default_value_t = ExrChannels::All, value_name = "CHANNELS")]
     pub exr: ExrChannels,
+    /// Layers to write into EXR pictures, separated by commas: what the eye meets first in each pixel (see docs/layers.md)
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    pub layers: Vec<Layer>,
+}
+
+/// Whether a command denoises.
+#[derive(Debug, Clone, Args)]
+pub struct DenoiseArgs {
+    /// Denoise with Open Image Denoise, and say how wrong the denoised picture is. It becomes layers of EXR pictures, and with each
+    /// NAME.png there is a NAME.denoised.png; all else stays the unbiased picture
+    #[arg(long)]
+    pub denoise: bool,
+    /// The library of Open Image Denoise, or its folder [default: ETENDUE_OIDN, else where it is usually, such as in the Python
+    /// package pyoidn]
+    #[arg(long, value_name = "PATH", requires = "denoise")]
+    pub oidn: Option<PathBuf>,
 }
 
 impl PictureArgs {

@@ -5,7 +5,9 @@ use super::failure::Failure;
 use super::files::{Files, is_stdout, write_text};
 use super::progress::Progress;
 use super::{say, write_stdout};
-use crate::compare::{Incomparable, LABELS, Limits, Side, compare as compare_pictures, html};
+use crate::compare::{
+    Incomparable, LABELS, Limits, Side, compare as compare_pictures, html, layers,
+};
 use crate::files::atomic;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -54,6 +56,9 @@ pub fn compare(args: &CompareArgs) -> Result<(), Failure> {
     };
     let mut comparison =
         compare_pictures(&a, &b, &limits).map_err(|e| Failure::Input(advised(&e)))?;
+    if let (false, [a, b]) = (args.layers.is_empty(), &sides) {
+        comparison.layers = layers::differing(&a[0], &b[0], &args.layers)?;
+    }
     match &sides {
         [a, b] if a.len() == 1 && b.len() == 1 => {
             if is_same_file(&a[0], &b[0]) {

@@ -2,9 +2,11 @@
 
 use super::args::{Backend, RenderArgs};
 use super::audience::{self, Audience};
+use super::denoise::{self, Made, prepare, with_denoised, write_pictures};
 use super::events;
 use super::failure::Failure;
 use super::files::{Files, Written, write_text};
+use super::layers;
 use super::looks::measured;
 use super::progress::{Progress, clock, point};
 use super::saver::{Saver, longest_call};
@@ -17,15 +19,18 @@ use crate::files::FileError;
 use crate::files::lock::Lock;
 use crate::files::room;
 use crate::film::Film;
+use crate::film::REPLICATES;
 use crate::film::coverage::Rect;
 use crate::film::error::{Doubt, RelativeError};
 use crate::film::pilot::Pilot;
+use crate::film::replicates::NoReplicates;
 use crate::gpu::Making;
 use crate::kernel::{self, Access};
+use crate::layers::View;
 use crate::log::{End, Event, Point};
-use crate::output::Format;
 use crate::output::report::{self, Report, Seconds};
 use crate::output::store;
+use crate::output::{Extra, Format};
 use crate::provenance::Provenance;
 use crate::render::backend::{self, Chosen};
 use crate::render::memory::{self, Need};
@@ -48,7 +53,7 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let begun = Instant::now();
 
     // Check everything that can be checked before the first sample.
-    let outputs = outputs(args);
+    let outputs = with_denoised(&outputs(args), args.denoise.denoise)?;
     let files = check_files(args, &outputs)?;
     plan::check_flags(args.backend, args.adapter.as_deref())?;
     super::set_threads(args.talk.threads);
@@ -77,6 +82,8 @@ fn render_before(
     mut files: Files,
     signals: &Signals,
 ) -> Result<(), Failure> {
+    let denoiser = args.denoise.denoiser(args.talk.threads)?;
+
     // Read the scene, and the film if it exists.
     let mut stages = Stages::new(&args.talk);
     stages.begin(format!("reading {}", args.scene.display()));
@@ -126,6 +133,11 @@ fn render_before(
         }
     };
     let samples = plan::samples(args, &settings, &regions, &film.coverage)?;
+
+    let least = REPLICATES as u64 * settings.round();
+    if denoiser.is_some() && samples.end < least {
+        return Err(Failure::Input(NoReplicates::TooFew(least).to_string()));
+    }
 
     // Make the engine, and write its kernel for --dump-wgsl.
     stages.begin(format!("preparing {things}"));
@@ -218,13 +230,36 @@ fn render_before(
             return Err(failure);
         }
     };
+    let mut made = None;
     if !film.coverage.is_empty() {
-        for path in outputs.iter().chain(&args.watch) {
-            let format = Format::from_path(path).map_err(Failure::Input)?;
-            let options = args.pictures.options();
-            stages.begin(format!("writing {}", path.display()));
-            written.note(path, format.write(path, &film, &provenance, &options));
+        let mut extra = Extra::default();
+        let mut progress = Progress::new(&args.talk);
+        let denoiser = denoiser.filter(|_| reason != StopReason::Interrupted);
+        if denoiser.is_some() || !args.pictures.layers.is_empty() {
+            let view = View::new(&scene, &settings);
+            let bounds = film.bounds;
+            layers::add(&mut extra, &args.pictures, &view, bounds, &mut progress);
+            if let Some(by) = &denoiser {
+                let task = prepare(&film, &provenance, &view, &mut progress);
+                let task = task.map_err(|why| Failure::Input(why.to_string()));
+                let done =
+                    task.and_then(|task| Made::new(by, &task, &film, &provenance, &mut progress));
+                match done {
+                    Ok(done) => {
+                        done.add_to(&mut extra);
+                        made = Some(done);
+                    }
+                    // The unbiased picture is written all the same.
+                    Err(failure) => written.note(Path::new("denoised picture"), Err(failure)),
+                }
+            }
         }
+        progress.finish();
+        let of = (&film, &provenance);
+        let beside = (&extra, made.as_ref());
+        let outputs: Vec<PathBuf> = outputs.iter().chain(&args.watch).cloned().collect();
+        let next = |_: usize, path: &Path| stages.begin(format!("writing {}", path.display()));
+        write_pictures(&outputs, of, &args.pictures, beside, &mut written, next)?;
     }
     stages.begin("looking at every pixel");
     let error = provenance.error(&film);
@@ -243,12 +278,17 @@ fn render_before(
             },
             counters: tally.counters,
         };
-        let json = Report::new(facts, &film, &provenance).to_json();
+        let mut report = Report::new(facts, &film, &provenance);
+        report.denoised = made.as_ref().map(Made::report);
+        let json = report.to_json();
         if let Err(e) = write_text(path, &json) {
             written.note(path, Err(e));
         }
     }
     if !args.talk.quiet {
+        if let Some(made) = &made {
+            say!("{}", made.statement());
+        }
         ending::say_end(args, &film, &error, &tally, reason, written.list());
         let is_png = |path: &PathBuf| Format::from_path(path) == Ok(Format::Png);
         if outputs.iter().any(is_png) {
@@ -294,6 +334,10 @@ fn outputs(args: &RenderArgs) -> Vec<PathBuf> {
 fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure> {
     for path in outputs {
         Format::from_path(path).map_err(Failure::Input)?;
+    }
+    layers::check(&args.pictures, outputs)?;
+    if args.denoise.denoise {
+        denoise::check(&args.pictures)?;
     }
     if let Some(path) = &args.watch
         && Format::from_path(path) != Ok(Format::Png)

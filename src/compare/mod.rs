@@ -6,6 +6,7 @@
 pub mod flip;
 mod grid;
 pub mod html;
+pub mod layers;
 pub mod metrics;
 mod picture;
 mod renders;
@@ -53,6 +54,8 @@ pub struct Comparison {
     pub verdict: Option<Verdict>,
     /// Limits that are exceeded, in words.
     pub exceeded: Vec<String>,
+    /// Layers that were asked for and differ, in words.
+    pub layers: Vec<String>,
     /// What the user should know about the pair.
     pub notes: Vec<String>,
     /// Whether every pixel is the same to the bit.
@@ -132,6 +135,7 @@ pub fn compare(a: &Side, b: &Side, limits: &Limits) -> Result<Comparison, Incomp
         metrics,
         verdict,
         exceeded: exceeded.into_iter().flatten().collect(),
+        layers: Vec::new(),
         notes: notes(a, b),
         identical,
         labels: LABELS,
@@ -187,6 +191,8 @@ fn notes(a: &Side, b: &Side) -> Vec<String> {
 impl Comparison {
     /// Whether nothing speaks against the pictures being the same.
     pub fn same(&self) -> bool {
-        self.exceeded.is_empty() && self.verdict.as_ref().is_none_or(Verdict::same)
+        self.exceeded.is_empty()
+            && self.layers.is_empty()
+            && self.verdict.as_ref().is_none_or(Verdict::same)
     }
 }

@@ -17,6 +17,7 @@ struct Report<'a> {
     verdict: Option<&'a Verdict>,
     metrics: Distances,
     exceeded: &'a [String],
+    layers: &'a [String],
     notes: &'a [String],
 }
 
@@ -55,6 +56,7 @@ impl Comparison {
             verdict: self.verdict.as_ref(),
             metrics: Distances::of(&self.metrics),
             exceeded: &self.exceeded,
+            layers: &self.layers,
             notes: &self.notes,
         };
         let mut json = serde_json::to_string_pretty(&report).expect("a report is plain data");

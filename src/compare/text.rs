@@ -9,6 +9,18 @@ pub(super) const CHANNELS: [&str; 4] = ["red", "green", "blue", "Y"];
 impl Comparison {
     /// The verdict in one sentence, and what the limits say besides.
     pub fn sentence(&self) -> String {
+        let of_light = self.sentence_of_light();
+        if self.layers.is_empty() {
+            return of_light;
+        }
+        format!(
+            "different: {}; the light: {of_light}",
+            self.layers.join("; ")
+        )
+    }
+
+    /// The same of the light alone, without layers.
+    fn sentence_of_light(&self) -> String {
         let exceeded = self.exceeded.join("; ");
         match &self.verdict {
             Some(v) if self.identical && v.same() => "bit-identical".into(),

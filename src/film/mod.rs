@@ -13,6 +13,7 @@ mod left_out;
 pub mod merge;
 pub mod pilot;
 mod pooled;
+pub mod replicates;
 pub mod splats;
 
 use crate::stats::luminance;

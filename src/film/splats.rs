@@ -92,6 +92,11 @@ impl Splats {
         })
     }
 
+    /// Whether some replicate of some pixel has no pass.
+    pub(super) fn lacks_passes(&self) -> bool {
+        self.passes.iter().flatten().any(|n| *n == 0)
+    }
+
     fn count(&mut self, bounds: Rect, rect: Rect, ranges: &[Range<u64>], strata: u32) {
         let more = replicate_counts(ranges, strata);
         let width = bounds.width() as usize;

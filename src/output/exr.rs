@@ -5,11 +5,12 @@ use super::metadata::{Value, entries};
 use super::pixels::{Pixels, finite};
 use crate::files::FileError;
 use crate::files::atomic;
+use crate::film::coverage::Rect;
 use crate::film::{Estimate, Film};
 use crate::provenance::Provenance;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Image,
-    Layer, LayerAttributes, LineOrder, Text, Vec2, WritableImage, f16,
+    Layer, LayerAttributes, LineOrder, SmallVec, Text, Vec2, WritableImage, f16,
 };
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -27,6 +28,15 @@ pub fn channel_values(estimate: Option<Estimate>) -> [f32; CHANNELS.len()] {
     })
 }
 
+/// What a picture holds beside the film's own channels.
+#[derive(Debug, Clone, Default)]
+pub struct Extra {
+    /// Names of channels, and their values for the whole picture, row by row, all finite.
+    pub channels: Vec<(&'static str, Vec<f32>)>,
+    /// Entries of the header.
+    pub entries: Vec<(&'static str, Value)>,
+}
+
 /// Writes the whole picture in ZIP-compressed scan lines, which every reader knows. All channels are `R G B A`, `error.R error.G
 /// error.B error.Y` (standard errors of the mean, `Y` of the luminance) and `samples`, as 32-bit floats: counts are exact up to
 /// 2^24. Readers that trip over layers get `R G B` alone. Equal pictures are equal files.
@@ -39,12 +49,22 @@ pub fn write_exr(
     provenance: &Provenance,
     channels: ExrChannels,
 ) -> Result<(), FileError> {
+    write_exr_with(path, film, provenance, channels, &Extra::default())
+}
+
+/// The same with other channels beside.
+pub fn write_exr_with(
+    path: &Path,
+    film: &Film,
+    provenance: &Provenance,
+    channels: ExrChannels,
+    extra: &Extra,
+) -> Result<(), FileError> {
     let names: &[&str] = match channels {
         ExrChannels::All => &CHANNELS,
         ExrChannels::Rgb | ExrChannels::RgbHalf => &CHANNELS[..3],
     };
-    let size = Vec2(film.size[0] as usize, film.size[1] as usize);
-    let mut values = vec![Vec::with_capacity(size.area()); names.len()];
+    let mut values = vec![Vec::with_capacity(Rect::whole(film.size).area() as usize); names.len()];
     let pixels = Pixels::new(film);
     for y in 0..film.size[1] {
         for x in 0..film.size[0] {
@@ -54,20 +74,43 @@ pub fn write_exr(
             }
         }
     }
-    let channels = names.iter().zip(values).map(|(&name, values)| {
-        let values = match channels {
-            ExrChannels::All | ExrChannels::Rgb => FlatSamples::F32(values),
-            ExrChannels::RgbHalf => FlatSamples::F16(values.into_iter().map(half).collect()),
-        };
-        AnyChannel::new(name, values)
-    });
+    let samples = |values: Vec<f32>| match channels {
+        ExrChannels::All | ExrChannels::Rgb => FlatSamples::F32(values),
+        ExrChannels::RgbHalf => FlatSamples::F16(values.into_iter().map(half).collect()),
+    };
+    let own = names.iter().copied().zip(values);
+    let all = own.chain(extra.channels.iter().cloned());
+    let channels = all.map(|(name, values)| AnyChannel::new(name, samples(values)));
+    let more = extra
+        .entries
+        .iter()
+        .map(|(key, value)| (*key, value.clone()));
+    let attributes = attributes(entries(provenance).into_iter().chain(more));
+    write(path, film.size, channels.collect(), attributes)
+}
+
+/// Writes a picture of R, G and B alone, row by row.
+pub fn write_exr_rgb(path: &Path, size: [u32; 2], rgb: &[[f32; 3]]) -> Result<(), FileError> {
+    let plane = |c: usize| FlatSamples::F32(rgb.iter().map(|p| p[c]).collect());
+    let channels = ["R", "G", "B"].iter().enumerate();
+    let channels = channels.map(|(c, name)| AnyChannel::new(*name, plane(c)));
+    write(path, size, channels.collect(), LayerAttributes::default())
+}
+
+fn write(
+    path: &Path,
+    size: [u32; 2],
+    channels: SmallVec<[AnyChannel<FlatSamples>; 4]>,
+    attributes: LayerAttributes,
+) -> Result<(), FileError> {
+    let size = Vec2(size[0] as usize, size[1] as usize);
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    let channels = AnyChannels::sort(channels.collect());
-    let layer = Layer::new(size, attributes(provenance), encoding, channels);
+    let channels = AnyChannels::sort(channels);
+    let layer = Layer::new(size, attributes, encoding, channels);
     let image = Image::from_layer(layer);
     atomic::replace(path, |file| {
         let written = image.write().to_buffered(&mut *file);
@@ -120,11 +163,11 @@ fn half(x: f32) -> f16 {
     f16::from_f32(x.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
 }
 
-fn attributes(provenance: &Provenance) -> LayerAttributes {
+fn attributes(entries: impl Iterator<Item = (&'static str, Value)>) -> LayerAttributes {
     // The exr crate's conversion from str accepts only Latin-1, but OpenEXR uses UTF-8.
     let text = |s: &str| Text::from_slice_unchecked(s.as_bytes());
     let mut attributes = LayerAttributes::default();
-    for (key, value) in entries(provenance) {
+    for (key, value) in entries {
         match value {
             // A standard attribute, for which exr has a field.
             Value::Text(software) if key == "software" => {

@@ -53,6 +53,43 @@ pub fn read_exr(path: &Path) -> Result<Picture, FileError> {
     decode(Cursor::new(bytes.as_slice())).map_err(|e| failure(path, e))
 }
 
+/// A layer of an EXR file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExrLayer {
+    /// Pixels of a row.
+    pub width: usize,
+    /// Its channels by name, in the order of their names: all that begin with the layer's name and a dot.
+    pub channels: Vec<(String, Vec<f32>)>,
+}
+
+/// Reads the layers with these names, in their order. A file that lacks one, or has a value in it that is not finite, has the wrong content.
+pub fn read_exr_layers(path: &Path, names: &[String]) -> Result<Vec<ExrLayer>, FileError> {
+    let mut bytes = Vec::new();
+    open(path)?
+        .read_to_end(&mut bytes)
+        .map_err(|e| FileError::io(path, "cannot read", &e))?;
+    let layer = layer(Cursor::new(bytes.as_slice())).map_err(|e| failure(path, e))?;
+    let size = [layer.size.0 as u32, layer.size.1 as u32];
+    let of_name = |name: &String| {
+        let start = format!("{name}.");
+        let all = layer.channel_data.list.iter();
+        let channels = all.filter(|c| utf8(&c.name).starts_with(&start)).map(|c| {
+            let values = interleave([c], size, f32::NEG_INFINITY)?;
+            Ok((utf8(&c.name), values.into_iter().map(|[v]| v).collect()))
+        });
+        let channels: exr::error::Result<Vec<_>> = channels.collect();
+        let channels = channels.map_err(|e| failure(path, e))?;
+        if channels.is_empty() {
+            return Err(FileError::content(path, format!("it has no layer {name}")));
+        }
+        Ok(ExrLayer {
+            width: layer.size.0,
+            channels,
+        })
+    };
+    names.iter().map(of_name).collect()
+}
+
 fn failure(path: &Path, e: Error) -> FileError {
     let error = match e {
         Error::Io(e) => FileError::reading(path, &e),
@@ -63,7 +100,12 @@ fn failure(path: &Path, e: Error) -> FileError {
     kind::explain(error, "an EXR picture", Some(FileKind::Exr))
 }
 
-fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
+fn decode(from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
+    picture(layer(from)?)
+}
+
+/// All channels of the first part.
+fn layer(mut from: Cursor<&[u8]>) -> exr::error::Result<Layer<AnyChannels<FlatSamples>>> {
     let length = from.get_ref().len() as u64;
     let meta = MetaData::read_from_buffered(&mut from, false)?;
     for header in &meta.headers {
@@ -93,7 +135,7 @@ fn decode(mut from: Cursor<&[u8]>) -> exr::error::Result<Picture> {
         // A panic on another thread could not be told from a crash, and this is fast enough.
         .non_parallel()
         .from_buffered(from)?;
-    picture(image.layer_data)
+    Ok(image.layer_data)
 }
 
 fn invalid(message: String) -> Error {

@@ -3,6 +3,7 @@
 use crate::provenance::{Provenance, integrator_name, light_name};
 
 /// Value of an entry.
+#[derive(Debug, Clone, PartialEq)]
 pub enum Value {
     /// UTF-8.
     Text(String),

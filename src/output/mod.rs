@@ -12,15 +12,16 @@ mod png_read;
 pub mod report;
 pub mod store;
 
-pub use exr::{CHANNELS, channel_values, write_exr};
-pub use exr_read::{ExrHeader, Picture, read_exr, read_exr_header};
+pub use exr::{CHANNELS, Extra, channel_values, write_exr, write_exr_rgb, write_exr_with};
+pub use exr_read::{ExrHeader, ExrLayer, Picture, read_exr, read_exr_header, read_exr_layers};
 pub use exr_stated::Moments;
 pub use image_read::{Image, read_image};
+pub use metadata::Value;
 pub(crate) use metadata::{NUMBERS, entries};
 pub(crate) use pixels::Pixels;
-pub use png::write_png;
+pub use png::{write_png, write_png_of};
 pub use png_read::{PngHeader, read_png, read_png_header};
-pub use report::Report;
+pub use report::{DenoisedReport, Report};
 
 use crate::files::kind::{self, FileKind};
 use crate::files::{FileError, open};
@@ -127,8 +128,20 @@ impl Format {
         provenance: &Provenance,
         options: &WriteOptions,
     ) -> Result<(), FileError> {
+        self.write_with(path, film, provenance, options, &Extra::default())
+    }
+
+    /// The same with other channels beside, where the format has room for them.
+    pub fn write_with(
+        self,
+        path: &Path,
+        film: &Film,
+        provenance: &Provenance,
+        options: &WriteOptions,
+        extra: &Extra,
+    ) -> Result<(), FileError> {
         match self {
-            Self::Exr => write_exr(path, film, provenance, options.exr),
+            Self::Exr => write_exr_with(path, film, provenance, options.exr, extra),
             Self::Png => write_png(path, film, provenance, options.exposure_stops),
         }
     }

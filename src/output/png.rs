@@ -5,6 +5,7 @@ use super::pixels::Pixels;
 use crate::files::FileError;
 use crate::files::atomic;
 use crate::film::Film;
+use crate::film::coverage::Rect;
 use crate::provenance::Provenance;
 use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 use std::io::{self, Write};
@@ -20,62 +21,111 @@ pub fn write_png(
     provenance: &Provenance,
     exposure_stops: f64,
 ) -> Result<(), FileError> {
-    atomic::replace(path, |file| {
-        encode(file, film, provenance, exposure_stops).map_err(|e| match e {
-            EncodingError::IoError(e) => e,
-            other => io::Error::other(other),
+    let pixels = Pixels::new(film);
+    let drawing = Drawing {
+        size: film.size,
+        opaque: pixels.complete(),
+        gain: exposure_stops.exp2(),
+        entries: entries(provenance),
+    };
+    drawing.write(path, |x, y| pixels.at(x, y).map(|e| e.mean))
+}
+
+/// Writes another picture of the pixels `bounds` of a film of `size`, row by row; `more` goes into its text chunks.
+pub fn write_png_of(
+    path: &Path,
+    [size, bounds]: [Rect; 2],
+    rgb: &[[f32; 3]],
+    provenance: &Provenance,
+    more: &[(&'static str, Value)],
+    exposure_stops: f64,
+) -> Result<(), FileError> {
+    let drawing = Drawing {
+        size: [size.width(), size.height()],
+        opaque: size == bounds,
+        gain: exposure_stops.exp2(),
+        entries: entries(provenance)
+            .into_iter()
+            .chain(more.iter().cloned())
+            .collect(),
+    };
+    let width = bounds.width() as usize;
+    drawing.write(path, |x, y| {
+        bounds.contains(x, y).then(|| {
+            let i = (y - bounds.y0) as usize * width + (x - bounds.x0) as usize;
+            rgb[i].map(f64::from)
         })
     })
 }
 
-fn encode(
-    file: impl Write,
-    film: &Film,
-    provenance: &Provenance,
-    exposure_stops: f64,
-) -> Result<(), EncodingError> {
-    let pixels = Pixels::new(film);
-    let gain = exposure_stops.exp2();
-    let [width, height] = film.size;
-    let mut encoder = Encoder::new(file, width, height);
-    let opaque = pixels.complete();
-    encoder.set_color(if opaque {
-        ColorType::Rgb
-    } else {
-        ColorType::Rgba
-    });
-    encoder.set_depth(BitDepth::Eight);
-    encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
-    for (key, value) in entries(provenance) {
-        let text = match value {
-            Value::Text(text) => text.replace('\0', "\u{fffd}"),
-            Value::Number(x) => x.to_string(),
-        };
-        let keyword = keyword(key).into();
-        if text.is_ascii() {
-            encoder.add_text_chunk(keyword, text)?;
-        } else {
-            encoder.add_itxt_chunk(keyword, text)?;
-        }
+/// All of a PNG but its pixels.
+struct Drawing {
+    size: [u32; 2],
+    /// Whether no pixel is missing.
+    opaque: bool,
+    gain: f64,
+    entries: Vec<(&'static str, Value)>,
+}
+
+impl Drawing {
+    fn write(
+        self,
+        path: &Path,
+        pixel: impl Fn(u32, u32) -> Option<[f64; 3]>,
+    ) -> Result<(), FileError> {
+        atomic::replace(path, |file| {
+            self.encode(file, pixel).map_err(|e| match e {
+                EncodingError::IoError(e) => e,
+                other => io::Error::other(other),
+            })
+        })
     }
-    let mut writer = encoder.write_header()?;
-    let mut rows = writer.stream_writer()?;
-    let mut row = Vec::new();
-    for y in 0..height {
-        row.clear();
-        for x in 0..width {
-            match pixels.at(x, y) {
-                Some(e) => {
-                    row.extend(e.mean.map(|v| encode_srgb(v * gain)));
-                    row.extend((!opaque).then_some(255));
-                }
-                None => row.extend([0; 4]),
+
+    fn encode(
+        self,
+        file: impl Write,
+        pixel: impl Fn(u32, u32) -> Option<[f64; 3]>,
+    ) -> Result<(), EncodingError> {
+        let [width, height] = self.size;
+        let mut encoder = Encoder::new(file, width, height);
+        encoder.set_color(if self.opaque {
+            ColorType::Rgb
+        } else {
+            ColorType::Rgba
+        });
+        encoder.set_depth(BitDepth::Eight);
+        encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric);
+        for (key, value) in self.entries {
+            let text = match value {
+                Value::Text(text) => text.replace('\0', "\u{fffd}"),
+                Value::Number(x) => x.to_string(),
+            };
+            let keyword = keyword(key).into();
+            if text.is_ascii() {
+                encoder.add_text_chunk(keyword, text)?;
+            } else {
+                encoder.add_itxt_chunk(keyword, text)?;
             }
         }
-        rows.write_all(&row)?;
+        let mut writer = encoder.write_header()?;
+        let mut rows = writer.stream_writer()?;
+        let mut row = Vec::new();
+        for y in 0..height {
+            row.clear();
+            for x in 0..width {
+                match pixel(x, y) {
+                    Some(rgb) => {
+                        row.extend(rgb.map(|v| encode_srgb(v * self.gain)));
+                        row.extend((!self.opaque).then_some(255));
+                    }
+                    None => row.extend([0; 4]),
+                }
+            }
+            rows.write_all(&row)?;
+        }
+        rows.finish()?;
+        writer.finish()
     }
-    rows.finish()?;
-    writer.finish()
 }
 
 /// The PNG specification's own keyword where it has one (11.3.3.1), else the key.

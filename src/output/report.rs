@@ -6,6 +6,7 @@ use crate::files::atomic;
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::provenance::{Provenance, count_or_mean};
+use crate::stats::denoised::{Rms, Statement, Why};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::Path;
@@ -60,6 +61,71 @@ pub struct Report {
     pub run: Work,
     /// What is in the picture: the work of this run and of all before.
     pub film: Work,
+    /// How wrong the denoised picture is; only there if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub denoised: Option<DenoisedReport>,
+}
+
+/// Key `denoised`, and the report of `etendue develop`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DenoisedReport {
+    /// What has denoised it.
+    pub denoiser: String,
+    /// Of the unbiased picture.
+    pub raw: RmsReport,
+    /// Of the mean of six denoised pictures.
+    pub mean: RmsReport,
+    /// Of their mixture with the unbiased one, which is the denoised picture.
+    pub mixture: RmsReport,
+    /// Change of the mean luminance by the denoiser, as a share.
+    pub mean_light: f64,
+    /// The same for the mixture.
+    pub mixture_light: f64,
+    /// Pixels of lamps, which keep the values of the unbiased picture.
+    pub lamp_pixels: usize,
+}
+
+/// A root mean square error of luminance over the mean luminance; null if it is not known.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RmsReport {
+    /// The error.
+    pub rms_error: Option<f64>,
+    /// Its standard error.
+    pub uncertainty: Option<f64>,
+    /// Why it is not known, in words.
+    pub not_known: Option<String>,
+}
+
+impl RmsReport {
+    fn new(rms: &Rms) -> Self {
+        Self {
+            rms_error: rms.value(),
+            uncertainty: rms.error(),
+            not_known: rms.why().map(Why::to_string),
+        }
+    }
+}
+
+impl DenoisedReport {
+    /// Of what `denoiser` has made, with so many pixels of lamps.
+    pub fn new(denoiser: &str, statement: &Statement, lamp_pixels: usize) -> Self {
+        Self {
+            denoiser: denoiser.into(),
+            raw: RmsReport::new(&statement.raw),
+            mean: RmsReport::new(&statement.mean),
+            mixture: RmsReport::new(&statement.mixture),
+            mean_light: statement.light,
+            mixture_light: statement.mixture_light,
+            lamp_pixels,
+        }
+    }
+
+    /// Indented JSON and a line break.
+    pub fn to_json(&self) -> String {
+        let mut json = serde_json::to_string_pretty(self).expect("plain data");
+        json.push('\n');
+        json
+    }
 }
 
 /// Keys `run` and `film`.
@@ -160,6 +226,7 @@ impl Report {
                 paths: provenance.counters.paths,
                 seconds: provenance.seconds,
             },
+            denoised: None,
         }
     }
 

@@ -53,6 +53,10 @@ pub struct CompareArgs {
     /// Largest relative RMSE allowed, such as 0.02 or 2%
     #[arg(long, value_name = "X", value_parser = values::limit, allow_hyphen_values = true)]
     pub max_relative_rmse: Option<f64>,
+    /// Compare these layers of two EXR files too, separated by commas: they must be equal but for rounding (see docs/layers.md). Without
+    /// it layers are ignored
+    #[arg(long, value_delimiter = ',', value_name = "LIST", requires = "b")]
+    pub layers: Vec<String>,
     /// Write an HTML page with both pictures, their difference and all numbers
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

@@ -1,6 +1,6 @@
 //! The command line of `etendue render`.
 
-use super::{Backend, PictureArgs, Talk};
+use super::{Backend, DenoiseArgs, PictureArgs, Talk};
 use crate::cli::values;
 use crate::film::BLOCK;
 use crate::film::coverage::Rect;
@@ -52,6 +52,9 @@ pub struct RenderArgs {
     /// How pictures are written.
     #[command(flatten)]
     pub pictures: PictureArgs,
+    /// Whether it denoises.
+    #[command(flatten)]
+    pub denoise: DenoiseArgs,
     /// Rewrite this .png every few seconds, for an image viewer that reloads it
     #[arg(long, value_name = "FILE.png")]
     pub watch: Option<PathBuf>,

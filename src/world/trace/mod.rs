@@ -7,6 +7,7 @@ pub mod camera;
 pub mod cylinder;
 pub mod dielectric;
 pub mod disk;
+mod finder;
 pub mod huge_sphere;
 pub mod mirror;
 pub mod plane;
@@ -16,6 +17,7 @@ pub mod sphere;
 pub(crate) mod brute_force;
 
 pub use camera::camera_ray;
+pub use finder::Finder;
 
 use super::{AIR, Geometry, Side, World, WorldPrimitive};
 use crate::scene::Bsdf;
@@ -73,46 +75,67 @@ pub struct Hit {
     pub met: Met,
 }
 
+/// The nearest surface so far, by its number among lights and primitives.
+struct Nearest {
+    number: usize,
+    hit: Hit,
+}
+
 impl World {
     /// The nearest thing that the ray meets. If several are at the same distance, it is the first of them: lights come before
-    /// primitives, and each kind is in the order of the world.
+    /// primitives, and each kind is in the order of the world. [`Finder`] finds the same, faster where there are many.
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let mut nearest: Option<Hit> = None;
-        let nearer = |t: f64, nearest: &Option<Hit>| nearest.as_ref().is_none_or(|n| t < n.t);
-        for (index, l) in self.lights.iter().enumerate() {
-            let met = disk::intersect(l.center, l.normal, l.offset, l.radius, l.face, ray);
-            if let Some(t) = met.filter(|&t| nearer(t, &nearest)) {
-                let front = l.normal.dot(ray.direction) < 0.0;
-                nearest = Some(Hit {
-                    t,
-                    point: plane::project(l.normal, l.offset, ray.at(t)),
-                    normal: if front { l.normal } else { -l.normal },
-                    face: l.face,
-                    met: Met::Light { index, front },
-                });
-            }
+        let mut nearest = None;
+        for number in 0..self.surface_count() {
+            self.meet_nearer(number, ray, &mut nearest);
         }
-        for (index, p) in self.primitives.iter().enumerate() {
-            let Some(inside) = is_inside(p, ray.medium) else {
-                continue;
-            };
-            let met = meet(p, inside, ray);
-            if let Some((t, face)) = met.filter(|&(t, _)| nearer(t, &nearest)) {
+        nearest.map(|n: Nearest| n.hit)
+    }
+
+    /// Puts surface number `number` in place of `nearest` if the ray meets it first. Lights are numbered first, then primitives.
+    fn meet_nearer(&self, number: usize, ray: &Ray, nearest: &mut Option<Nearest>) {
+        let is_first = |t: f64| {
+            nearest
+                .as_ref()
+                .is_none_or(|n| t < n.hit.t || t == n.hit.t && number < n.number)
+        };
+        let hit = match self.primitive(number) {
+            None => {
+                let l = &self.lights[number];
+                let met = disk::intersect(l.center, l.normal, l.offset, l.radius, l.face, ray);
+                met.filter(|&t| is_first(t)).map(|t| {
+                    let front = l.normal.dot(ray.direction) < 0.0;
+                    Hit {
+                        t,
+                        point: plane::project(l.normal, l.offset, ray.at(t)),
+                        normal: if front { l.normal } else { -l.normal },
+                        face: l.face,
+                        met: Met::Light {
+                            index: number,
+                            front,
+                        },
+                    }
+                })
+            }
+            Some(p) => is_inside(p, ray.medium).and_then(|inside| {
+                let (t, face) = meet(p, inside, ray).filter(|&(t, _)| is_first(t))?;
                 let (point, outward) = surface(p, face, ray.at(t));
                 let turn = match p.geometry {
                     Geometry::Disk { .. } => outward.dot(ray.direction) > 0.0,
                     _ => inside,
                 };
-                nearest = Some(Hit {
+                Some(Hit {
                     t,
                     point,
                     normal: if turn { -outward } else { outward },
                     face: p.faces[face],
-                    met: Met::Primitive(index),
-                });
-            }
+                    met: Met::Primitive(number - self.lights.len()),
+                })
+            }),
+        };
+        if let Some(hit) = hit {
+            *nearest = Some(Nearest { number, hit });
         }
-        nearest
     }
 
     /// Whether a ray that is aimed at the front of light `light` meets something before it. A ray that misses the light, or comes
