@@ -15,13 +15,14 @@
 //!
 //! The same replicates give a **mixture** with the raw picture, X = raw + w (G − raw), where w minimises the expected squared error.
 //! It rests on the covariance of G and the raw picture, ¼ (A − C)(F_A − F_C) on average over the three ways to halve the replicates into A
-//! and C. The weight of a pixel comes from its surroundings without itself, so that its own noise does not choose it.
+//! and C. The weight of a pixel comes from its surroundings without itself, so that its own noise does not choose it; but where the denoised pixel and
+//! its neighbours are clearly worse than the raw ones, the raw pixel stays.
 //!
 //! The estimate of one pixel is about 1.6 times as noisy as the raw pixel's variance is large. So it is a statement about pictures
 //! and areas.
 
 use super::luminance;
-use super::pool::{gaussian, hollow};
+use super::pool::{gaussian, hollow, nine};
 use std::fmt;
 
 /// Replicates.
@@ -34,7 +35,11 @@ pub const PAIRS: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 
 /// Standard deviation in pixels of the surroundings that choose a pixel's weight.
 const WEIGHT_SIGMA: f64 = 4.0;
 
-/// The same for the indication.
+/// A pixel keeps its raw value if the squared error of the denoised mean, over itself and its eight neighbours, is above so many times that of
+/// the raw picture. Without any error of its own that number is 0.0 ± 0.5 for equal pixels, so noise hardly ever has this effect.
+const VETO: f64 = 2.5;
+
+/// Standard deviation in pixels of the surroundings that the indication is a mean over.
 const INDICATION_SIGMA: f64 = 4.0;
 
 /// The share of the picture's mean luminance that is added to a pixel's own where errors of dark and bright pixels are weighed.
@@ -272,11 +277,15 @@ pub fn judge(
         .collect();
     let gain = hollow(&gain, width, WEIGHT_SIGMA);
     let apart = hollow(&apart, width, WEIGHT_SIGMA);
+    // A denoiser that loses something small is not seen by the surroundings. So the pixel and its neighbours have a veto.
+    let [own, noise] = [&squares.mean, &squares.raw].map(|of| nine(of, width));
+    let vetoed = own.iter().zip(&noise).map(|(e, s)| *e > VETO * s);
     let weight: Vec<f64> = gain
         .iter()
         .zip(&apart)
-        .map(|(c, d)| {
-            if *d > 0.0 {
+        .zip(vetoed)
+        .map(|((c, d), vetoed)| {
+            if *d > 0.0 && !vetoed {
                 (c / d).clamp(0.0, 1.0)
             } else {
                 0.0

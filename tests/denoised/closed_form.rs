@@ -161,7 +161,7 @@ fn trial(all: &[[Rgb; 4]], truth: &[f64], denoiser: &dyn Fn(&Rgb) -> Rgb) -> Tri
 #[test]
 fn the_estimate_is_the_true_squared_error_on_average() {
     let (scene, truth) = (scene(), truth());
-    let all: Vec<[Rgb; 4]> = (1000..1320)
+    let all: Vec<[Rgb; 4]> = (20_000..20_320)
         .map(|seed| replicates(&scene, seed, 16))
         .collect();
     // First of all: the closed form is that of the scene.
@@ -194,8 +194,9 @@ fn the_estimate_is_the_true_squared_error_on_average() {
             "{name}: {:+.4}, {:.2} standard errors, {:?} held",
             t.surplus, t.z, t.held
         );
+        // Five denoisers are tried at once: one in seventy such sets has one beyond three standard errors.
         assert!(
-            t.z.abs() < 2.0,
+            t.z.abs() < 3.0,
             "{name}: {:+.3}, {:.2} standard errors",
             t.surplus,
             t.z

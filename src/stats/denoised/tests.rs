@@ -284,3 +284,17 @@ fn what_is_not_known_is_not_stated() {
     let judged = judge(&own, &[(); 6].map(|()| truth.clone()), WIDTH, None);
     assert!(matches!(judged.statement.mean, Rms::Unknown(_)));
 }
+
+/// A median loses a highlight of one pixel. The surroundings, where it does well, do not see that.
+#[test]
+fn a_highlight_that_a_denoiser_loses_stays() {
+    let mut bright = truth();
+    let i = WIDTH * 8 + 8;
+    bright[i] = [40.0; 3];
+    let replicates = replicates(&bright, 3, [64; 4]);
+    let judged = judge(&replicates, &folds(&replicates, median), WIDTH, None);
+    assert!(luminance(judged.mean[i].map(f64::from)) < 10.0);
+    assert_eq!(judged.weight[i], 0.0);
+    assert_eq!(judged.mixture[i], mean_of(&replicates)[i]);
+    assert!(judged.weight.iter().filter(|w| **w > 0.5).count() > 100);
+}
