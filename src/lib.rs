@@ -42,7 +42,8 @@ pub use files::FileError;
 pub use film::coverage::Rect;
 pub use film::error::{Doubt, RelativeError};
 pub use film::{Estimate, Film};
-pub use glam::DVec3;
+pub use glam::{DMat3, DVec3};
+pub use implicit::{Clip, Implicit, WrongFormula};
 pub use provenance::{DeviceUse, Provenance};
 pub use render::{
     Backend, CPU_TIME, DEFAULT_SPP, Error, MAX_SAMPLES, Options, Picture, Progress, Renderer,
@@ -62,6 +63,8 @@ pub mod files;
 pub mod film;
 #[doc(hidden)]
 pub mod gpu;
+#[doc(hidden)]
+pub mod implicit;
 #[doc(hidden)]
 pub mod kernel;
 #[doc(hidden)]

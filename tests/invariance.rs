@@ -57,6 +57,7 @@ fn moved(scene: &Scene, scale: f64, rotation: DMat3, shift: DVec3) -> Scene {
                 point(top);
                 *radius *= scale;
             }
+            Shape::Implicit(_) => unreachable!("these scenes have none"),
         }
     }
     s
@@ -145,12 +146,12 @@ impl Dice {
 }
 
 /// Shuffles `list`, and lets those that have a `rank`, which coincide, stand in the order of their ranks.
-fn shuffle<T: Copy>(dice: &mut Dice, list: &mut [T], rank: impl Fn(&T) -> Option<usize>) {
+fn shuffle<T: Clone>(dice: &mut Dice, list: &mut [T], rank: impl Fn(&T) -> Option<usize>) {
     dice.shuffle(list);
     let places: Vec<usize> = (0..list.len())
         .filter(|&k| rank(&list[k]).is_some())
         .collect();
-    let mut ranked: Vec<T> = places.iter().map(|&k| list[k]).collect();
+    let mut ranked: Vec<T> = places.iter().map(|&k| list[k].clone()).collect();
     ranked.sort_by_key(&rank);
     for (place, thing) in places.into_iter().zip(ranked) {
         list[place] = thing;

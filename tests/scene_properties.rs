@@ -72,6 +72,7 @@ fn to_toml(scene: &Scene) -> Result<String, std::fmt::Error> {
                 writeln!(s, "base = {}\ntop = {}", vector(base), vector(top))?;
                 writeln!(s, "radius = {radius:?}")?;
             }
+            Shape::Implicit(_) => unreachable!("random scenes have none"),
         }
         writeln!(
             s,
@@ -142,9 +143,9 @@ fn like(read: &Scene, written: &Scene) -> Scene {
         if let (
             Shape::Plane { normal: n, .. } | Shape::Disk { normal: n, .. },
             Shape::Plane { normal: m, .. } | Shape::Disk { normal: m, .. },
-        ) = (&mut a.shape, b.shape)
+        ) = (&mut a.shape, &b.shape)
         {
-            *n = same(*n, m);
+            *n = same(*n, *m);
         }
     }
     read

@@ -75,6 +75,21 @@ base = [0, 0, 0]
 top = [0, 1, 0]
 radius = 2
 material = 'gloss'
+[[implicit]]
+f = 'a x^2 + y'
+parameters = { a = 2 }
+level = -1e3
+center = [0, 1, 0]
+scale = 0.5
+rotation = { axis = [0, 1, 0], angle = 400 }
+bounds = { min = [-1, -1, -1], max = [1, 1, 1] }
+closed = false
+material = 'gloss'
+[[implicit]]
+f = 'x'
+rotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+bounds = { radius = 3 }
+material = 'glass'
 [[light]]
 center = [0, 4, 0]
 normal = [0, -1, 0]
@@ -99,6 +114,7 @@ fn valid(schema: &Value, value: &Value) -> bool {
                 "object" => value.is_object(),
                 "array" => value.is_array(),
                 "string" => value.is_string(),
+                "boolean" => value.is_boolean(),
                 "number" => value.is_number(),
                 "integer" => value.is_u64() || value.is_i64(),
                 other => panic!("unknown type {other}"),
@@ -336,8 +352,8 @@ fn the_schema_is_complete_for_editors() {
     let schema = schema();
     let mut defaults = 0;
     walk(&schema, &mut defaults);
-    // up; max_depth, strata, seed; the mirror's reflectance; ior, transmittance.
-    assert_eq!(defaults, 7);
+    // up; max_depth, strata, seed; the mirror's reflectance; ior, transmittance; level, center, scale, rotation, closed of a formula.
+    assert_eq!(defaults, 12);
     assert_eq!(
         schema["$schema"],
         json!("http://json-schema.org/draft-07/schema#")

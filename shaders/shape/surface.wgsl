@@ -23,7 +23,7 @@ struct Surface {
 }
 
 fn face_of(s: Surface, part: u32) -> u32 {
-#if CYLINDER
+#if PARTS
     return select(select(s.faces.x, s.faces.y, part == 1u), s.faces.z, part == 2u);
 #else
     return s.faces.x;
@@ -51,6 +51,11 @@ struct Vertex {
 fn vertex_at(ray: Ray, hit: Hit, s: Surface) -> Vertex {
     let part = hit.key & 3u;
     let p = ray.o + hit.t * ray.d;
+#if IMPLICIT
+    if s.shape == SHAPE_IMPLICIT {
+        return implicit_vertex(hit.key, p, ray.d);
+    }
+#endif
 #if ROUND
     let m = p - s.point;
 #endif

@@ -27,7 +27,8 @@ pub fn export(args: &ExportArgs) -> Result<(), Failure> {
         &args.output
     };
     let stem = named.file_stem().unwrap_or_default().to_string_lossy();
-    let exported = export_scene(&scene, target, args.size, args.spp, &format!("{stem}.exr"));
+    let exported = export_scene(&scene, target, args.size, args.spp, &format!("{stem}.exr"))
+        .map_err(|e| parse::ReadError::Invalid(vec![e]))?;
     for warning in &exported.warnings {
         say!("warning: {warning}");
     }

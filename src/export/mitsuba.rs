@@ -52,7 +52,7 @@ pub(super) fn export(scene: &Scene, settings: &Settings, samples: u64) -> Export
     for (k, primitive) in scene.primitives.iter().enumerate() {
         out.gap();
         let material = &scene.materials[primitive.material].name;
-        shape(&mut out, scene, k, primitive.shape, material);
+        shape(&mut out, scene, k, &primitive.shape, material);
     }
     out.close("scene");
     out.0.end()
@@ -144,9 +144,10 @@ fn diffuse(out: &mut Xml, reflectance: DVec3) {
     out.close("bsdf");
 }
 
-fn shape(out: &mut Xml, scene: &Scene, index: usize, shape: Shape, material: &str) {
+fn shape(out: &mut Xml, scene: &Scene, index: usize, shape: &Shape, material: &str) {
     let reference = format!("<ref id=\"{}\"/>", escape(material));
-    match shape {
+    match *shape {
+        Shape::Implicit(_) => unreachable!("export refuses it"),
         Shape::Sphere { center, radius } => {
             out.open("shape type=\"sphere\"");
             out.line(&format!(

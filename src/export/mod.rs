@@ -9,7 +9,7 @@ mod pbrt;
 mod planes;
 mod text;
 
-use crate::scene::{Bsdf, Scene};
+use crate::scene::{Bsdf, Diagnostic, Primitive, Scene, Shape};
 use crate::settings::{Overrides, Settings};
 use glam::DVec3;
 
@@ -33,22 +33,37 @@ pub struct Exported {
 
 /// The scene for another renderer, of `size` if that is given, with `samples` per pixel. `picture` is the name of the picture for
 /// formats that have one.
+///
+/// # Errors
+/// About a surface that no other renderer has.
 pub fn export(
     scene: &Scene,
     target: Target,
     size: Option<[u32; 2]>,
     samples: u64,
     picture: &str,
-) -> Exported {
+) -> Result<Exported, Diagnostic> {
+    let no_equal = |p: &&Primitive| matches!(p.shape, Shape::Implicit(_));
+    if let Some(p) = scene.primitives.iter().find(no_equal) {
+        return Err(Diagnostic {
+            path: scene.path.clone(),
+            line: p.line,
+            column: p.column,
+            message:
+                "an implicit surface has no equal in other renderers: the scene can't be exported"
+                    .into(),
+            unreadable: false,
+        });
+    }
     let overrides = Overrides {
         size,
         ..Overrides::default()
     };
     let settings = Settings::resolve(scene, &overrides);
-    match target {
+    Ok(match target {
         Target::Mitsuba => mitsuba::export(scene, &settings, samples),
         Target::Pbrt => pbrt::export(scene, &settings, samples, picture),
-    }
+    })
 }
 
 /// The first line of a file: where it comes from.

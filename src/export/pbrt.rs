@@ -38,7 +38,7 @@ pub(super) fn export(scene: &Scene, settings: &Settings, samples: u64, picture: 
     for (k, primitive) in scene.primitives.iter().enumerate() {
         out.gap();
         let material = &scene.materials[primitive.material].name;
-        shape(&mut out, scene, k, primitive.shape, material);
+        shape(&mut out, scene, k, &primitive.shape, material);
     }
     out.0.end()
 }
@@ -134,9 +134,10 @@ fn bsdf(out: &mut Writer, name: &str, bsdf: Bsdf) {
     }
 }
 
-fn shape(out: &mut Writer, scene: &Scene, index: usize, shape: Shape, material: &str) {
+fn shape(out: &mut Writer, scene: &Scene, index: usize, shape: &Shape, material: &str) {
     let named = format!("NamedMaterial \"{}\"", quoted(material));
-    match shape {
+    match *shape {
+        Shape::Implicit(_) => unreachable!("export refuses it"),
         Shape::Sphere { center, radius } => {
             out.open();
             out.line(&named);

@@ -41,6 +41,7 @@ pub(super) fn extent(scene: &Scene) -> (DVec3, f64) {
         Shape::Cylinder { base, top, radius } => {
             Some((0.5 * (base + top), radius + 0.5 * base.distance(top)))
         }
+        Shape::Implicit(ref implicit) => Some(implicit.ball()),
         Shape::Plane { .. } => None,
     }));
     let low = balls

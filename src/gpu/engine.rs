@@ -303,7 +303,7 @@ impl GpuEngine {
 
     /// Whether the kernel counts its loop trips and leaves what it cannot finish.
     fn counts_trips(&self) -> bool {
-        self.kernel.access == Access::Tree
+        self.kernel.trips_per_sample == 0
     }
 
     /// Dispatches up to `most` samples of each pixel of some of the workgroups of `rect` until all are done. `place` says

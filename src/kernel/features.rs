@@ -49,16 +49,22 @@ pub(super) enum Flag {
     LitCaps,
     /// Some light's radius is out of the ordinary.
     ExtremeLights,
+    /// There are implicit surfaces.
+    Implicit,
+    /// There are surfaces with several parts.
+    Parts,
 }
 
 impl Flag {
-    const ALL: [Self; 6] = [
+    const ALL: [Self; 8] = [
         Self::Cylinder,
         Self::Flat,
         Self::Round,
         Self::HugeSphere,
         Self::LitCaps,
         Self::ExtremeLights,
+        Self::Implicit,
+        Self::Parts,
     ];
 
     fn name(self) -> &'static str {
@@ -69,6 +75,8 @@ impl Flag {
             Self::HugeSphere => "HUGE_SPHERE",
             Self::LitCaps => "LIT_CAPS",
             Self::ExtremeLights => "EXTREME_LIGHTS",
+            Self::Implicit => "IMPLICIT",
+            Self::Parts => "PARTS",
         }
     }
 
@@ -172,7 +180,7 @@ impl Features {
         Self {
             access: Access::Baked,
             materials: MaterialKind::ALL.into_iter().collect(),
-            shapes: ShapeKind::ALL.into_iter().collect(),
+            shapes: ShapeKind::FIXED.into_iter().collect(),
             lit_caps: false,
             extreme_lights: false,
             light_sampling: probe.glossy,
@@ -217,6 +225,16 @@ impl Features {
         self.shapes.contains(&kind)
     }
 
+    /// Whether there are implicit surfaces.
+    pub fn has_implicit(&self) -> bool {
+        self.has_shape(ShapeKind::Implicit)
+    }
+
+    /// Whether what a ray takes is not known beforehand, so that the kernel counts its loop trips.
+    pub fn counts_trips(&self) -> bool {
+        self.access == Access::Tree || self.has_implicit()
+    }
+
     /// Whether lights are sampled for lobes.
     pub fn glossy(&self) -> bool {
         self.light_sampling && self.materials.iter().any(|m| m.is_glossy())
@@ -232,7 +250,11 @@ impl Features {
         let any = |kinds: &[ShapeKind]| kinds.iter().any(|k| self.has_shape(*k));
         match flag {
             Flag::Cylinder => any(&[ShapeKind::Cylinder]),
-            Flag::Flat => any(&[ShapeKind::Plane, ShapeKind::Disk, ShapeKind::Cylinder]),
+            // Of implicit surfaces alone, something must stand in the place of what others have.
+            Flag::Flat => {
+                any(&[ShapeKind::Plane, ShapeKind::Disk, ShapeKind::Cylinder])
+                    || self.shapes.iter().all(|k| *k == ShapeKind::Implicit)
+            }
             Flag::Round => any(&[
                 ShapeKind::Cylinder,
                 ShapeKind::Sphere,
@@ -241,6 +263,8 @@ impl Features {
             Flag::HugeSphere => any(&[ShapeKind::HugeSphere]),
             Flag::LitCaps => self.lit_caps,
             Flag::ExtremeLights => self.extreme_lights,
+            Flag::Implicit => self.has_implicit(),
+            Flag::Parts => any(&[ShapeKind::Cylinder, ShapeKind::Implicit]),
         }
     }
 
@@ -256,7 +280,9 @@ impl Features {
                 format!("{}u", kind as u32),
             );
         }
-        for kind in ShapeKind::ALL {
+        let made = ShapeKind::ALL.into_iter();
+        let made = made.filter(|k| ShapeKind::FIXED.contains(k) || self.has_shape(*k));
+        for kind in made {
             let name = kind.name().to_uppercase();
             constant(
                 &mut s,

@@ -15,10 +15,21 @@ pub(crate) enum ShapeKind {
     Cylinder,
     Sphere,
     HugeSphere,
+    Implicit,
 }
 
 impl ShapeKind {
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
+        Self::Plane,
+        Self::Disk,
+        Self::Cylinder,
+        Self::Sphere,
+        Self::HugeSphere,
+        Self::Implicit,
+    ];
+
+    /// Those that the modules of the shaders meet. The others are met by code that is made for one scene.
+    pub const FIXED: [Self; 5] = [
         Self::Plane,
         Self::Disk,
         Self::Cylinder,
@@ -33,6 +44,7 @@ impl ShapeKind {
             Geometry::Cylinder { .. } => Self::Cylinder,
             Geometry::Sphere { .. } => Self::Sphere,
             Geometry::HugeSphere { .. } => Self::HugeSphere,
+            Geometry::Implicit(_) => Self::Implicit,
         }
     }
 
@@ -44,6 +56,7 @@ impl ShapeKind {
             Self::Cylinder => "cylinder",
             Self::Sphere => "sphere",
             Self::HugeSphere => "huge_sphere",
+            Self::Implicit => "implicit",
         }
     }
 
@@ -60,6 +73,7 @@ impl ShapeKind {
             Self::Sphere => ("Sphere", &["point", "radius"]),
             // The offset is the curvature.
             Self::HugeSphere => ("HugeSphere", &["point", "offset", "axis"]),
+            Self::Implicit => unreachable!("its values stand in its own functions"),
         };
         let fields: Vec<String> = fields.iter().map(|f| field(f)).collect();
         format!("{name}({})", fields.join(", "))
@@ -332,6 +346,7 @@ impl Surface {
                 offset: (1.0 / radius) as f32,
                 ..s
             },
+            Geometry::Implicit(_) => s,
         }
     }
 }

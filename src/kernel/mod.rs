@@ -108,10 +108,12 @@ fn scene_text(world: &World, settings: &Settings, features: &Features) -> String
     let mut s = features.constants();
     s.push_str(&features.scene_constants(world, settings));
     let parted = (features.access == Access::Tree).then(|| Parted::new(world));
-    if let Some(parted) = &parted {
-        let [start, vertex] = trips::counted(world, settings, features, parted);
+    if features.counts_trips() {
+        let [start, vertex] = trips::counted(world, settings, features, parted.as_ref());
         constant(&mut s, "TRIPS_AT_START", "u32", format!("{start}u"));
         constant(&mut s, "TRIPS_AT_VERTEX", "u32", format!("{vertex}u"));
+    }
+    if let Some(parted) = &parted {
         s.push_str(&records::Records::new(world, parted).constants(world));
         if light_tree::serves(world.lights.len()) {
             let ends = light_tree::ends(world.lights.len());
@@ -123,6 +125,7 @@ fn scene_text(world: &World, settings: &Settings, features: &Features) -> String
     s.push_str("\n// ---- this scene\n\n");
     s.push_str(&emit::materials::predicates(features));
     s.push_str(&emit::materials::dispatch(features));
+    s.push_str(&emit::implicit::generate(world, features));
     s.push_str(&emit::surfaces::generate(world, features, parted.as_ref()));
     s.push_str(&emit::lights::scale(world));
     s.push_str(&emit::lights::keeps(settings.light));

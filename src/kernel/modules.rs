@@ -40,6 +40,9 @@ modules! {
     PLANE = "shape/plane",
     SPHERE = "shape/sphere",
     HUGE_SPHERE = "shape/huge_sphere",
+    IMPLICIT_AFFINE = "implicit/affine",
+    IMPLICIT_BOUNDS = "implicit/bounds",
+    IMPLICIT_SURFACE = "implicit/surface",
     BUFFERS = "fetch/buffers",
     RECORDS = "fetch/records",
     WALK = "tree/walk",
@@ -75,6 +78,7 @@ modules! {
     GLANCE_SENT = "glance/sent",
     TRIPS_UNLIMITED = "trips/unlimited",
     TRIPS_COUNTED = "trips/counted",
+    TRIPS_LEFT = "trips/left",
     CONTROL_STRAIGHT = "control/straight",
     CONTROL_BRANCHING = "control/branching",
     VERTEX = "vertex",
@@ -130,9 +134,9 @@ pub(super) fn of_path(f: &Features) -> Vec<Module> {
         (true, _) => vec![DIRECT_SAMPLED, DIRECT_SEVERAL],
     });
     modules.extend(match f.access {
+        _ if f.counts_trips() => [TRIPS_COUNTED, STORE_UNFINISHED, CONTROL_BRANCHING],
         Access::Baked => [TRIPS_UNLIMITED, STORE_FINISHED, CONTROL_STRAIGHT],
-        Access::Buffers => [TRIPS_UNLIMITED, STORE_FINISHED, CONTROL_BRANCHING],
-        Access::Tree => [TRIPS_COUNTED, STORE_UNFINISHED, CONTROL_BRANCHING],
+        _ => [TRIPS_UNLIMITED, STORE_FINISHED, CONTROL_BRANCHING],
     });
     modules
 }
@@ -147,9 +151,9 @@ pub(super) fn of_light_paths(f: &Features) -> Vec<Module> {
         VERTEX,
     ];
     modules.extend(match f.access {
+        _ if f.counts_trips() => [TRIPS_COUNTED, LIGHT_PATH_BRANCHING],
         Access::Baked => [TRIPS_UNLIMITED, LIGHT_PATH_STRAIGHT],
-        Access::Buffers => [TRIPS_UNLIMITED, LIGHT_PATH_BRANCHING],
-        Access::Tree => [TRIPS_COUNTED, LIGHT_PATH_BRANCHING],
+        _ => [TRIPS_UNLIMITED, LIGHT_PATH_BRANCHING],
     });
     modules
 }
@@ -193,6 +197,12 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
             .filter(|(kind, _)| f.has_shape(*kind))
             .map(|s| s.1),
     );
+    if f.has_implicit() {
+        modules.extend([IMPLICIT_AFFINE, IMPLICIT_BOUNDS]);
+        if f.access != Access::Tree {
+            modules.push(TRIPS_LEFT);
+        }
+    }
     if f.scatters() {
         modules.push(COSINE);
     }

@@ -9,7 +9,7 @@ use super::emit::surfaces::{Function, Target, for_shadows, targets};
 use super::layout::ShapeKind;
 use super::modules::{DESCENT, LEAF_CYLINDER, LEAF_DISK, LEAF_SPHERE, Module};
 use super::preprocess::fill;
-use crate::world::{Bounds, Tree, World};
+use crate::world::{Bounds, Geometry, Tree, World, WorldPrimitive};
 use glam::DVec3;
 use std::fmt::Write as _;
 
@@ -131,6 +131,11 @@ fn by_distance(world: &World, numbers: Vec<usize>) -> impl Iterator<Item = Vec<u
 /// The box around surface number `number`, if it has bounds.
 fn bounds(world: &World, number: usize) -> Option<Bounds> {
     match world.primitive(number) {
+        // Each has a function of its own, so no walk leads to it.
+        Some(WorldPrimitive {
+            geometry: Geometry::Implicit(_),
+            ..
+        }) => None,
         Some(p) => p.geometry.bounds(),
         None => {
             let l = &world.lights[number];
@@ -186,7 +191,9 @@ fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
         ShapeKind::Sphere => (LEAF_SPHERE, "sphere"),
         ShapeKind::Disk => (LEAF_DISK, "disk"),
         ShapeKind::Cylinder => (LEAF_CYLINDER, "cylinder"),
-        ShapeKind::Plane | ShapeKind::HugeSphere => unreachable!("it has no bounds"),
+        ShapeKind::Plane | ShapeKind::HugeSphere | ShapeKind::Implicit => {
+            unreachable!("none is in a tree")
+        }
     };
     let hit = if any { "hit" } else { "Hit(FAR, NONE)" };
     // What leaves hold of each kind.

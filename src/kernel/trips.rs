@@ -12,7 +12,7 @@ use super::features::Features;
 use super::glances::MAX_GLANCES;
 use super::trees::Parted;
 use crate::settings::Settings;
-use crate::world::{World, light_tree, visibility};
+use crate::world::{Geometry, World, WorldPrimitive, light_tree, visibility};
 
 /// The most loop trips that an invocation may take on this adapter. A driver that names no version counts as old.
 pub(crate) fn limit(adapter: &str, driver: &str) -> u64 {
@@ -63,7 +63,13 @@ pub(super) fn at_vertex(
     } else {
         0
     };
-    1 + inner + shadow_loop + hidden
+    1 + inner + shadow_loop + hidden + onto_surfaces(world)
+}
+
+/// The loop trips that moving a hit onto an implicit surface takes. Meeting one counts its own.
+fn onto_surfaces(world: &World) -> u64 {
+    let implicit = |p: &&WorldPrimitive| matches!(p.geometry, Geometry::Implicit(_));
+    2 * world.primitives.iter().filter(implicit).count() as u64
 }
 
 /// The loop trips that the choice of a place in the pixel can take.
@@ -74,7 +80,7 @@ const LOOPS_AROUND: u64 = 11;
 
 /// The most loop trips that one sample can take; 0 if the kernel counts them itself.
 pub(super) fn per_sample(world: &World, settings: &Settings, features: &Features) -> u64 {
-    if features.access == Access::Tree {
+    if features.counts_trips() {
         return 0;
     }
     // Every glance counts as a whole vertex: while one lane sends a glance, another may go through all the loops of a vertex.
@@ -99,15 +105,12 @@ pub(super) fn counted(
     world: &World,
     settings: &Settings,
     features: &Features,
-    parted: &Parted,
+    parted: Option<&Parted>,
 ) -> [u64; 2] {
     let glances = u64::from(MAX_GLANCES * features.sight);
     // Light paths begin at any vertex, and have no glances or strata.
     let start = glances + STRATA_LOOP + LOOPS_AROUND;
-    [
-        start,
-        at_vertex(world, settings, features.access, Some(parted)),
-    ]
+    [start, at_vertex(world, settings, features.access, parted)]
 }
 
 #[cfg(test)]

@@ -139,6 +139,13 @@ impl Hasher {
                 self.vector(top);
                 self.number(radius);
             }
+            Shape::Implicit(ref implicit) => {
+                let words = implicit.words();
+                self.count(words.len());
+                for word in words {
+                    self.0.update(word.to_le_bytes());
+                }
+            }
         }
         self.bsdf(bsdf);
     }

@@ -1,11 +1,14 @@
 //! Scenes built in code. They are written as a scene file and read like one: every rule of the format holds for them too.
 
+use super::implicit;
 use super::parse::parse_str;
 use super::source::quoted;
 use super::{Bsdf, Camera, Diagnostic, Light, Parameter, Place, Scene, Shape};
+use crate::implicit::Implicit;
 use glam::DVec3;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::Arc;
 
 /// How far the length of a unit vector may be from 1: a few roundings of f64.
 const UNIT: f64 = 1e-14;
@@ -165,6 +168,19 @@ impl SceneBuilder {
         self.shape(&Shape::Cylinder { base, top, radius }, material)
     }
 
+    /// Where a formula has a certain value, or the solid that it bounds.
+    ///
+    /// ```
+    /// # use etendue::{Clip, Implicit};
+    /// let mut torus = Implicit::new("(x^2 + y^2 + z^2 + 1 - r^2)^2 - 4 (x^2 + y^2)", &[("r", 0.3)]).unwrap();
+    /// torus.clip = Clip::Box { min: [-1.4, -1.4, -0.4].into(), max: [1.4, 1.4, 0.4].into() };
+    /// torus.center.y = 0.5;
+    /// let scene = etendue::Scene::builder().implicit(&torus, "jade");
+    /// ```
+    pub fn implicit(self, implicit: &Implicit, material: &str) -> Self {
+        self.shape(&Shape::Implicit(Arc::new(implicit.clone())), material)
+    }
+
     /// A disk that emits `radiance`, linear RGB, on the side that `normal` points to; `normal` has any length.
     pub fn light(
         self,
@@ -253,6 +269,7 @@ impl SceneBuilder {
             Shape::Cylinder { base, top, radius } => {
                 keys(&[("base", base), ("top", top)]) + &key("radius", radius)
             }
+            Shape::Implicit(ref implicit) => implicit::text(implicit, string),
         };
         let text = format!("{text}material = {}\n", string(material));
         self.table(shape.kind(), text)
@@ -332,6 +349,8 @@ pub(crate) fn checked(scene: &Scene) -> Result<(Scene, String), Vec<Diagnostic>>
     let normals = scene.primitives.iter().all(|p| match p.shape {
         Shape::Plane { normal, .. } | Shape::Disk { normal, .. } => unit(normal),
         Shape::Sphere { .. } | Shape::Cylinder { .. } => true,
+        // A rotation that is read again is the same if it was one.
+        Shape::Implicit(ref implicit) => unit(implicit.rotation.x_axis),
     });
     let same = normals && scene.lights.iter().all(|l| unit(l.normal)) && unit(scene.camera.up);
     // Normalising twice may move a last bit, and with it samples.

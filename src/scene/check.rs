@@ -5,6 +5,7 @@ mod cross;
 mod eye;
 mod far;
 mod geometry;
+mod implicit;
 mod lights;
 mod open;
 
@@ -57,9 +58,13 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
 
 /// The warnings about a picture of this size from a GPU; or from the reference, which has f64, without a size.
 pub fn lints(scene: &Scene, on_gpu: Option<[u32; 2]>) -> Lints {
-    let mut picture = vec![eye::warnings(scene)];
+    let mut picture = vec![eye::warnings(scene), implicit::warnings(scene)];
     picture.extend(on_gpu.map(|size| far::warnings(scene, size)));
-    let mut remarks = vec![materials(scene), open::warnings(scene)];
+    let mut remarks = vec![
+        materials(scene),
+        open::warnings(scene),
+        implicit::cut(scene),
+    ];
     // One light that is off may be meant.
     let off = if scene.lights.iter().all(|l| l.radiance == DVec3::ZERO) {
         &mut picture

@@ -1,6 +1,7 @@
 //! Defines what each table of a scene file contains. The parser uses these definitions to read a file, and the schema uses
 //! them to list the keys.
 
+use super::implicit;
 use super::rows::{ColorMap, Keys, Map, RowKind, Species, SpeciesLook, is_xyz};
 use super::source::quoted;
 use super::value::{
@@ -183,11 +184,18 @@ pub(super) enum ShapeKind {
     Plane,
     Disk,
     Cylinder,
+    Implicit,
 }
 
 impl ShapeKind {
     /// In the order of [`Scene::primitives`](super::Scene::primitives).
-    pub(super) const ALL: [Self; 4] = [Self::Sphere, Self::Plane, Self::Disk, Self::Cylinder];
+    pub(super) const ALL: [Self; 5] = [
+        Self::Sphere,
+        Self::Plane,
+        Self::Disk,
+        Self::Cylinder,
+        Self::Implicit,
+    ];
 
     pub(super) fn name(self) -> &'static str {
         match self {
@@ -195,6 +203,7 @@ impl ShapeKind {
             Self::Plane => "plane",
             Self::Disk => "disk",
             Self::Cylinder => "cylinder",
+            Self::Implicit => "implicit",
         }
     }
 
@@ -206,6 +215,10 @@ impl ShapeKind {
             }
             Self::Disk => "A flat disk. Its material must not be dielectric.",
             Self::Cylinder => "A solid cylinder: side and two caps.",
+            Self::Implicit => {
+                "Where a formula has a certain value: the surface of the solid where it has less, or a surface without a solid, \
+                 which must not be dielectric."
+            }
         }
     }
 }
@@ -217,6 +230,7 @@ pub(super) fn primitive(t: &mut impl Table, kind: ShapeKind) -> Option<(Shape, S
         ShapeKind::Plane => plane(t),
         ShapeKind::Disk => disk(t),
         ShapeKind::Cylinder => cylinder(t),
+        ShapeKind::Implicit => implicit::read(t),
     };
     let material = t.required::<Text>("material", "NAME of a [material.NAME].");
     Some((shape?, material?.0))

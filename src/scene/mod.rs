@@ -8,6 +8,7 @@ pub mod check;
 mod format;
 #[doc(hidden)]
 pub mod generate;
+mod implicit;
 mod material;
 mod order;
 pub mod parse;
@@ -28,9 +29,11 @@ pub use order::Canonical;
 pub use rows::MAX_ROWS_BYTES;
 pub use value::{LARGEST_RESOLUTION, LARGEST_STRATA};
 
+use crate::implicit::Implicit;
 use glam::DVec3;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Path vertices after the eye when neither file nor flag says.
 pub const DEFAULT_MAX_DEPTH: u32 = 64;
@@ -53,7 +56,7 @@ pub struct Scene {
     pub render: RenderHints,
     /// Materials in the order of their names, those of colours in rows last.
     pub materials: Vec<Material>,
-    /// Primitives in the order spheres, planes, disks, cylinders, each in file order, those from files of rows after the others.
+    /// Primitives in the order spheres, planes, disks, cylinders, implicit surfaces, each in file order, those from files of rows after the others.
     pub primitives: Vec<Primitive>,
     /// Disk lights in file order, those from files of rows last; at least one.
     pub lights: Vec<Light>,
@@ -122,7 +125,7 @@ pub struct Place {
 }
 
 /// A surface with a material.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Primitive {
     /// Its geometry.
     pub shape: Shape,
@@ -144,7 +147,7 @@ impl Primitive {
 
 /// Analytic shapes. Normals have unit length.
 #[expect(missing_docs, reason = "the fields are the format's own keys")]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// radius > 0.
     Sphere { center: DVec3, radius: f64 },
@@ -162,6 +165,8 @@ pub enum Shape {
         top: DVec3,
         radius: f64,
     },
+    /// Where a formula has a certain value.
+    Implicit(Arc<Implicit>),
 }
 
 /// Disk luminaire: emits on its front, black and opaque otherwise, reflects nothing.
@@ -197,6 +202,7 @@ impl Shape {
             Shape::Plane { .. } => "plane",
             Shape::Disk { .. } => "disk",
             Shape::Cylinder { .. } => "cylinder",
+            Shape::Implicit(_) => "implicit",
         }
     }
 }

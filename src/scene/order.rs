@@ -6,8 +6,10 @@
 
 use super::{Bsdf, Light, Material, Primitive, Scene, Shape};
 use crate::coincidence::COINCIDENT;
+use crate::implicit::Implicit;
 use glam::DVec3;
 use rayon::prelude::*;
+use sha2::{Digest as _, Sha256};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
@@ -33,7 +35,10 @@ fn canonical(scene: &Scene) -> Scene {
 
     let bsdf = |p: &Primitive| s.materials[p.material].bsdf;
     let in_order = sorted(&s.primitives, primitive_key);
-    let shapes: Vec<Shape> = in_order.iter().map(|&i| s.primitives[i].shape).collect();
+    let shapes: Vec<Shape> = in_order
+        .iter()
+        .map(|&i| s.primitives[i].shape.clone())
+        .collect();
     let decides = |a: usize, b: usize| {
         let (p, q) = (&s.primitives[in_order[a]], &s.primitives[in_order[b]]);
         // Two surfaces of one opaque material look the same, so it does not matter which is met.
@@ -41,7 +46,7 @@ fn canonical(scene: &Scene) -> Scene {
         !alike && p.shape.may_coincide(&q.shape)
     };
     let kept = keep_file_order(&in_order, &shapes, decides);
-    s.primitives = kept.iter().map(|&i| s.primitives[i]).collect();
+    s.primitives = kept.iter().map(|&i| s.primitives[i].clone()).collect();
 
     let in_order = sorted(&s.lights, light_key);
     let disk = |i: &usize| {
@@ -110,7 +115,24 @@ fn primitive_key(p: &Primitive) -> Key {
             radius,
         } => numbers(2.0, radius, center, normal),
         Shape::Cylinder { base, top, radius } => numbers(3.0, radius, base, top),
+        Shape::Implicit(ref implicit) => {
+            let all = DVec3::new(implicit.level, number_of(implicit), 0.0);
+            numbers(4.0, implicit.scale, implicit.center, all)
+        }
     }
+}
+
+/// A number that no two implicit surfaces that differ have in common, but for one chance in 2⁵³.
+fn number_of(implicit: &Implicit) -> f64 {
+    let mut digest = Sha256::new();
+    for word in implicit.words() {
+        digest.update(word.to_le_bytes());
+    }
+    let first = digest
+        .finalize()
+        .first_chunk()
+        .map_or(0, |b| u64::from_le_bytes(*b));
+    (first >> 11) as f64
 }
 
 fn light_key(l: &Light) -> Key {
@@ -214,6 +236,10 @@ fn ball_of(shape: &Shape) -> (DVec3, f64) {
             (base + top) / 2.0,
             (1.0 + SLACK) * (base.distance(top) / 2.0).hypot(radius),
         ),
+        Shape::Implicit(ref implicit) => {
+            let (center, radius) = implicit.ball();
+            (center, SLACK * radius)
+        }
     };
     // Cells are counted in f64, so a ball must not be too small for its distance from the origin.
     (center, reach.max(1e-12 * center.length()).max(1e-30))
@@ -225,6 +251,7 @@ fn kind(shape: &Shape) -> u8 {
         Shape::Plane { .. } => 1,
         Shape::Disk { .. } => 2,
         Shape::Cylinder { .. } => 3,
+        Shape::Implicit(_) => 4,
     }
 }
 

@@ -6,7 +6,7 @@ use super::reader::Reader;
 use super::rows::{Palette, RowKind};
 use super::source::{Faults, Source, quoted, suggestion};
 use super::value::Text;
-use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Scene};
+use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Scene, Shape};
 use super::{rows, schema, syntax};
 use crate::files::kind::FileKind;
 use crate::files::reason;
@@ -17,6 +17,9 @@ use toml::de::{DeTable, DeValue};
 
 /// The largest scene file that is read, in bytes; that is half a million spheres or more.
 pub const MAX_FILE_BYTES: u64 = 64 << 20;
+
+/// The most implicit surfaces of a scene.
+pub const MAX_FORMULAS: usize = 64;
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -136,7 +139,7 @@ fn parse(source: Source) -> Result<Scene, Vec<Diagnostic>> {
 fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> {
     if root.is_empty() {
         let message = "is empty; a scene needs [camera], a [[light]], and a \
-                       [[sphere]], [[plane]], [[disk]] or [[cylinder]]";
+                       [[sphere]], [[plane]], [[disk]], [[cylinder]] or [[implicit]]";
         faults.push(None, message.into());
         return None;
     }
@@ -281,12 +284,17 @@ fn primitives(
                     return None;
                 }
             };
-            if kind == ShapeKind::Disk
-                && materials[material].bsdf.is_some_and(|b| b.is_dielectric())
+            let not_solid = match &shape {
+                Shape::Disk { .. } => Some("a disk"),
+                Shape::Implicit(implicit) if !implicit.closed => Some("an open surface"),
+                _ => None,
+            };
+            if let Some(what) =
+                not_solid.filter(|_| materials[material].bsdf.is_some_and(|b| b.is_dielectric()))
             {
                 let message = format!(
-                    "material {} is dielectric, but a disk is not solid; \
-                     dielectrics are allowed on spheres, cylinders and planes",
+                    "material {} is dielectric, but {what} is not solid; \
+                     dielectrics are allowed on spheres, cylinders, planes and closed implicit surfaces",
                     quoted(&name)
                 );
                 t.refuse("material", message);
@@ -302,7 +310,7 @@ fn primitives(
         let rows = match kind {
             ShapeKind::Sphere => RowKind::Sphere,
             ShapeKind::Cylinder => RowKind::Cylinder,
-            ShapeKind::Plane | ShapeKind::Disk => continue,
+            ShapeKind::Plane | ShapeKind::Disk | ShapeKind::Implicit => continue,
         };
         for more in file.each(rows.table(), |t, place| {
             surfaces(t, place, rows, materials, palette)
@@ -313,10 +321,19 @@ fn primitives(
             }
         }
     }
+    let formulas = file.table.get("implicit");
+    let formulas = formulas.and_then(|v| v.get_ref().as_array());
+    if let Some(beyond) = formulas.and_then(|all| all.get(MAX_FORMULAS)) {
+        let message = format!(
+            "more than {MAX_FORMULAS} [[implicit]]; each becomes code of its own, so a scene has at most so many. One formula may \
+             describe several solids: min(f, g)"
+        );
+        file.faults.push(Some(beyond.span().start), message);
+    }
     let wrong = ShapeKind::ALL.iter().any(|kind| file.is_wrong(kind.name()));
     if primitives.is_empty() && !wrong {
         let message = "no primitive; a scene needs at least one \
-                       [[sphere]], [[plane]], [[disk]] or [[cylinder]]";
+                       [[sphere]], [[plane]], [[disk]], [[cylinder]] or [[implicit]]";
         file.faults.push(None, message.into());
     }
     primitives

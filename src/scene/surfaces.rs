@@ -23,7 +23,7 @@ impl Shape {
             radius,
         };
         match *self {
-            Self::Sphere { .. } => Vec::new(),
+            Self::Sphere { .. } | Self::Implicit(_) => Vec::new(),
             Self::Plane { point, normal } => vec![flat(point, normal, f64::INFINITY)],
             Self::Disk {
                 center,
@@ -48,12 +48,12 @@ impl Shape {
     /// Whether both are spheres, or both are cylinders, and their curved surfaces coincide.
     pub(super) fn curved_coincides(&self, other: &Self, within: f64) -> bool {
         if let (
-            Self::Sphere { center, radius },
-            Self::Sphere {
+            &Self::Sphere { center, radius },
+            &Self::Sphere {
                 center: other_center,
                 radius: other_radius,
             },
-        ) = (*self, *other)
+        ) = (self, other)
         {
             return coincidence::spheres([center, other_center], [radius, other_radius], within);
         }
@@ -64,6 +64,9 @@ impl Shape {
     /// Whether two shapes of one kind may coincide anywhere, by a generous measure. Their order in the file then decides which of
     /// them a ray meets.
     pub(super) fn may_coincide(&self, other: &Self) -> bool {
+        if let Self::Implicit(_) = self {
+            return self == other;
+        }
         let (flats, others) = (self.flats(), other.flats());
         self.curved_coincides(other, MAY_COINCIDE)
             || flats

@@ -68,6 +68,7 @@ const LENGTH: Interval = Interval::closed(SMALLEST, LARGEST, F32);
 const LIGHT: Interval = Interval::closed(0.0, LARGEST, F32);
 const IOR: Interval = Interval::closed(1.0 / LARGEST_IOR, LARGEST_IOR, F32);
 const EXPONENT: Interval = Interval::closed(0.0, LARGEST_EXPONENT, F32);
+const LEVEL: Interval = Interval::closed(-LARGEST, LARGEST, F32);
 const FINITE: Interval = Interval::closed(-f64::MAX, f64::MAX, "");
 const ANGLE: Interval = Interval {
     low: 0.0,
@@ -143,7 +144,7 @@ fn brief(x: f64) -> String {
     }
 }
 
-fn wrong(found: &Spanned<DeValue>) -> Wrong {
+pub(super) fn wrong(found: &Spanned<DeValue>) -> Wrong {
     Wrong {
         span: found.span(),
         index: None,
@@ -151,7 +152,7 @@ fn wrong(found: &Spanned<DeValue>) -> Wrong {
 }
 
 /// Integers stand for floats; what overflows is infinite.
-fn number(found: &DeValue) -> Option<f64> {
+pub(super) fn number(found: &DeValue) -> Option<f64> {
     match found {
         DeValue::Float(x) => x.as_str().parse().ok(),
         DeValue::Integer(_) => match whole(found) {
@@ -175,7 +176,7 @@ fn count(found: &DeValue, low: u32, high: u32) -> Option<u32> {
 }
 
 /// An array of `N` values that `element` accepts.
-fn array<T, const N: usize>(
+pub(super) fn array<T, const N: usize>(
     found: &Spanned<DeValue>,
     element: impl Fn(&Spanned<DeValue>) -> Option<T>,
 ) -> Result<[T; N], Wrong> {
@@ -266,6 +267,8 @@ numbers! {
     Exponent: one of EXPONENT;
     /// Any finite number.
     Finite: one of FINITE;
+    /// A value of a formula.
+    Level: one of LEVEL;
 }
 
 numbers! {
@@ -377,6 +380,32 @@ impl Value for Map {
 
     fn to_json(&self) -> Json {
         json!(MAPS[self.0].0)
+    }
+}
+
+/// Whether something is so.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Truth(pub(super) bool);
+
+impl Value for Truth {
+    fn rule() -> String {
+        "true or false".into()
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        found
+            .get_ref()
+            .as_bool()
+            .map(Self)
+            .ok_or_else(|| wrong(found))
+    }
+
+    fn schema() -> Json {
+        json!({"type": "boolean"})
+    }
+
+    fn to_json(&self) -> Json {
+        json!(self.0)
     }
 }
 

@@ -110,7 +110,7 @@ impl Build {
 
     /// Adds several.
     pub fn add_all(self, things: &[(Shape, Bsdf)]) -> Self {
-        things.iter().fold(self, |b, &(s, m)| b.add(s, m))
+        things.iter().fold(self, |b, (s, m)| b.add(s.clone(), *m))
     }
 
     /// Adds a disk light; `normal` of any length, `radiance` the same in every channel.

@@ -244,9 +244,9 @@ fn zero_components(b: &Backend) -> Result<Vec<Measure>, Trouble> {
                 continue;
             }
             let scene = Build::new(eye, eye + v(0.1, 0.2, 1.0), 40.0);
-            let range = Range::new(b, &with_light(scene.add(shape, bsdf)), None);
-            let p = range.world().primitives[0];
-            let shots = axial_shots(&p);
+            let range = Range::new(b, &with_light(scene.add(shape.clone(), bsdf)), None);
+            let p = &range.world().primitives[0];
+            let shots = axial_shots(p);
             let landings = range.shoot(&shots)?;
             shots_fired += shots.len();
             broken += landings

@@ -9,6 +9,7 @@ use crate::reference::Estimator;
 use crate::scene::{Bsdf, Scene, Shape};
 use crate::settings::Settings;
 use glam::DVec3;
+use std::sync::Arc;
 
 pub const CASES: &[Case] = &[
     Case {
@@ -190,6 +191,7 @@ fn moved(b: &Backend) -> Result<Vec<Measure>, Trouble> {
                 *base += by;
                 *top += by;
             }
+            Shape::Implicit(implicit) => Arc::make_mut(implicit).center += by,
         }
     }
     for l in &mut scene.lights {

@@ -95,7 +95,7 @@ impl Specimen {
         // One kernel for all of a kind, for its values are in buffers.
         let range = Range::new(b, &self.build, Some(Access::Buffers));
         let number = range.number(|_| true);
-        let primitive = range.world().primitives[0];
+        let primitive = &range.world().primitives[0];
         let center = self.center - range.world().origin;
         // The eye's side, from which a plane can be met.
         let eye = range.world().camera.eye;
@@ -185,6 +185,6 @@ fn exit(geometry: &Geometry, from: DVec3, start: DVec3, direction: DVec3) -> Opt
             let cap = if along > 0.0 { offsets[1] } else { offsets[0] };
             Some((side.min((cap - axis.dot(from)) / along), a.sqrt()))
         }
-        Geometry::Plane { .. } | Geometry::Disk { .. } => None,
+        Geometry::Plane { .. } | Geometry::Disk { .. } | Geometry::Implicit(_) => None,
     }
 }

@@ -53,7 +53,7 @@ fn tube<'a>(
         .add(cylinder(ends[0], ends[1], radius), bsdf)
         .light(ends[0] + aside, aside, radius, 1.0);
     let range = Range::new(b, &build, None);
-    let p = range.world().primitives[0];
+    let p = &range.world().primitives[0];
     let Geometry::Cylinder {
         base,
         axis,

@@ -142,6 +142,7 @@ fn target(number: usize, geometry: &Geometry) -> Target {
             let half = 0.5 * (offsets[1] - offsets[0]);
             (base + axis * half, half.hypot(radius))
         }
+        Geometry::Implicit(ref implicit) => implicit.ball(),
         Geometry::Plane { .. } | Geometry::HugeSphere { .. } => (DVec3::ZERO, BOUNDLESS),
     };
     Target {

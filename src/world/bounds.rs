@@ -43,6 +43,10 @@ impl Geometry {
     pub fn bounds(&self) -> Option<Bounds> {
         match *self {
             Self::Plane { .. } | Self::HugeSphere { .. } => None,
+            Self::Implicit(ref implicit) => {
+                let (center, radius) = implicit.ball();
+                Some(Bounds::about(center, DVec3::splat(radius)))
+            }
             Self::Sphere { center, radius } => Some(Bounds::about(center, DVec3::splat(radius))),
             Self::Disk {
                 center,

@@ -83,7 +83,7 @@ fn flat_faces(lights: &[WorldLight], primitives: &[WorldPrimitive]) -> Vec<Face>
                     add(Owner::Cap(i, end), axis, offset, center, radius);
                 }
             }
-            Geometry::Sphere { .. } | Geometry::HugeSphere { .. } => {}
+            Geometry::Sphere { .. } | Geometry::HugeSphere { .. } | Geometry::Implicit(_) => {}
         }
     }
     faces

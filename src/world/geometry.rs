@@ -1,14 +1,16 @@
 //! Shapes in world space.
 
 use crate::coincidence::slack;
+use crate::implicit::{DiskPlace, Implicit};
 use crate::scene::Shape;
 use glam::DVec3;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A shape in world space. An `offset` is n·p of the plane that a face lies in. Faces that coincide have the same offset to the last
 /// bit, or the opposite one.
 #[expect(missing_docs, reason = "each variant's text names its fields")]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Geometry {
     /// Two-sided flat disk.
     Disk {
@@ -36,6 +38,8 @@ pub enum Geometry {
         normal: DVec3,
         radius: f64,
     },
+    /// Where a formula has a certain value.
+    Implicit(Arc<Implicit>),
 }
 
 /// Where a flat disk lies, relative to a solid.
@@ -85,15 +89,30 @@ impl Geometry {
                     radius,
                 }
             }
+            Shape::Implicit(ref implicit) => {
+                let mut moved = Implicit::clone(implicit);
+                moved.center -= origin;
+                Self::Implicit(Arc::new(moved))
+            }
         }
     }
 
-    /// How many faces it has: a cylinder has its side and two caps, anything else has one.
+    /// How many faces it has: a cylinder has its side and two caps, an implicit surface has what its formula makes and what its
+    /// bounds cut off, anything else has one.
     pub fn parts(&self) -> usize {
-        if matches!(self, Self::Cylinder { .. }) {
-            3
-        } else {
-            1
+        match self {
+            Self::Cylinder { .. } => 3,
+            Self::Implicit(_) => 2,
+            _ => 1,
+        }
+    }
+
+    /// Whether it is met from both sides, and bounds no solid.
+    pub fn is_sheet(&self) -> bool {
+        match self {
+            Self::Disk { .. } => true,
+            Self::Implicit(implicit) => !implicit.closed,
+            _ => false,
         }
     }
 
@@ -120,6 +139,7 @@ impl Geometry {
                 let m = p - base;
                 h > offsets[0] && h < offsets[1] && (m - axis * axis.dot(m)).length() < radius
             }
+            Self::Implicit(ref implicit) => implicit.holds(p),
             Self::Disk { .. } => false,
         }
     }
@@ -174,6 +194,11 @@ impl Geometry {
                     over_top || under_base || out - size >= radius - slack,
                 )
             }
+            Self::Implicit(ref implicit) => match implicit.place_of_disk(center, normal, size) {
+                DiskPlace::Inside => DiskSide::Inside,
+                DiskPlace::Outside => DiskSide::Outside,
+                DiskPlace::Cut => DiskSide::Cut,
+            },
             Self::Disk { .. } | Self::HugeSphere { .. } => {
                 sorted(self.holds(center), !self.holds(center))
             }
@@ -194,6 +219,7 @@ impl Geometry {
                 (base + axis * (length / 2.0), radius * radius * length * PI)
             }
             Self::Plane { normal, offset } => (normal * offset, f64::INFINITY),
+            Self::Implicit(ref implicit) => implicit.core(),
             Self::HugeSphere { .. } | Self::Disk { .. } => (DVec3::ZERO, 0.0),
         }
     }

@@ -13,7 +13,7 @@ const LARGEST_SCALE: f64 = 1e15;
 /// Turns opaque planes to the eye, and notes for opaque solids whether the eye is inside.
 pub(super) fn settle_sides(primitives: &mut [WorldPrimitive], materials: &[Bsdf], eye: DVec3) {
     for p in primitives {
-        if materials[p.material].is_dielectric() || matches!(p.geometry, Geometry::Disk { .. }) {
+        if materials[p.material].is_dielectric() || p.geometry.is_sheet() {
             continue;
         }
         let eye_inside = p.geometry.holds(eye);
@@ -142,7 +142,7 @@ impl Media {
         };
         let solid = |k: usize| {
             let mut s = Solid {
-                geometry: primitives[solids[k]].geometry,
+                geometry: primitives[solids[k]].geometry.clone(),
                 depth: 0,
                 index: 1.0,
             };

@@ -51,7 +51,7 @@ pub enum Side {
 }
 
 /// A primitive in world space.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct WorldPrimitive {
     /// Its shape.
     pub geometry: Geometry,
@@ -63,7 +63,8 @@ pub struct WorldPrimitive {
     pub solid: u32,
     /// The solid just outside `solid`.
     pub parent: u32,
-    /// Identities of its faces: side, base cap and top cap of a cylinder; other shapes use the first. The identity is the
+    /// Identities of its faces: side, base cap and top cap of a cylinder; surface and cap of an implicit surface; other shapes use the
+    /// first. The identity is the
     /// [`face`] of its own key, or of the key of the first flat face that coincides with it. Never 0.
     pub faces: [u32; 3],
     /// Whether any part of a light may lie inside this dielectric solid.
@@ -135,7 +136,7 @@ pub struct World {
     pub materials: Vec<Bsdf>,
     /// Lights that some ray can meet. A ray meets a light before anything that coincides with it.
     pub lights: Vec<WorldLight>,
-    /// Primitives that some ray can meet: disks, cylinders, planes, then spheres. Each kind is in the order of
+    /// Primitives that some ray can meet: disks, cylinders, planes, spheres, then implicit surfaces. Each kind is in the order of
     /// [`Canonical`]. Of primitives that coincide, a ray meets the first.
     pub primitives: Vec<WorldPrimitive>,
     /// Index of refraction of every medium, relative to air: first of air, then of the solids.
@@ -161,7 +162,7 @@ impl World {
         let origin = scene_origin / unit;
         let eye = scene.camera.eye - origin;
         let mut primitives: Vec<WorldPrimitive> = Vec::with_capacity(scene.primitives.len());
-        for kind in ["disk", "cylinder", "plane", "sphere"] {
+        for kind in ["disk", "cylinder", "plane", "sphere", "implicit"] {
             for p in scene.primitives.iter().filter(|p| p.shape.kind() == kind) {
                 primitives.push(WorldPrimitive {
                     geometry: Geometry::new(&p.shape, origin),
@@ -290,6 +291,10 @@ fn drop_what_no_path_reaches(
             )
         }
         Geometry::Sphere { center, radius } => {
+            reachable(center, &|_| radius, radius) || p.geometry.holds(eye)
+        }
+        Geometry::Implicit(ref implicit) => {
+            let (center, radius) = implicit.ball();
             reachable(center, &|_| radius, radius) || p.geometry.holds(eye)
         }
         Geometry::Plane { .. } | Geometry::HugeSphere { .. } => true,

@@ -49,6 +49,10 @@ fn comes_near(p: &WorldPrimitive, l: &WorldLight) -> bool {
         Geometry::Sphere { center, radius } => {
             ahead(before(center) + radius) && (center.distance(l.center) - radius).abs() < reach
         }
+        Geometry::Implicit(ref implicit) => {
+            let (center, radius) = implicit.ball();
+            ahead(before(center) + radius) && center.distance(l.center) - radius < reach
+        }
         Geometry::HugeSphere { pole, normal, .. } => {
             (normal.dot(l.center - pole)).abs() < reach && normal.dot(l.normal) < 1.0 - 1e-6
         }

@@ -4,6 +4,7 @@ use super::{Geometry, WorldLight, WorldPrimitive};
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 /// The origin of the world, in coordinates of the file.
 ///
@@ -20,6 +21,7 @@ pub(super) fn choose_origin(scene: &Scene) -> DVec3 {
                 sized.push((base, radius));
                 sized.push((top, radius));
             }
+            Shape::Implicit(ref implicit) => sized.push(implicit.ball()),
             Shape::Plane { .. } => {}
         }
     }
@@ -63,6 +65,10 @@ pub(super) fn choose_unit(scene: &Scene, origin: DVec3) -> f64 {
                 sized(base, radius);
                 sized(top, radius);
             }
+            Shape::Implicit(ref implicit) => {
+                let (center, radius) = implicit.ball();
+                sized(center, radius);
+            }
             Shape::Plane { .. } => {}
         }
     }
@@ -101,6 +107,11 @@ pub(super) fn in_units(scene: &Scene, unit: f64) -> Scene {
                 *top /= unit;
                 *radius /= unit;
             }
+            Shape::Implicit(implicit) => {
+                let implicit = Arc::make_mut(implicit);
+                implicit.center /= unit;
+                implicit.scale /= unit;
+            }
             Shape::Plane { point, .. } => *point /= unit,
         }
     }
@@ -130,6 +141,10 @@ pub(super) fn find_huge_spheres(
             } => {
                 let top = base + axis * (offsets[1] - offsets[0]);
                 extent = extent.max(base.length().max(top.length()) + radius);
+            }
+            Geometry::Implicit(ref implicit) => {
+                let (center, radius) = implicit.ball();
+                extent = extent.max(center.length() + radius);
             }
             Geometry::Sphere { center, radius } => spheres.push((radius, center, i)),
             Geometry::Plane { .. } | Geometry::HugeSphere { .. } => {}

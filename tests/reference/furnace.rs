@@ -21,16 +21,16 @@ fn dome(eye: DVec3, look_at: DVec3) -> Build {
 
 fn dome_with(things: &[(Shape, Bsdf)]) -> Build {
     let mut scene = dome(v(0.0, 0.5, 0.8), v(0.0, 0.4, 0.0));
-    for &(shape, bsdf) in things {
-        scene = scene.add(shape, bsdf);
+    for (shape, bsdf) in things {
+        scene = scene.add(shape.clone(), *bsdf);
     }
     scene
 }
 
 #[test]
 fn objects_without_loss_are_invisible_in_the_white_dome() {
-    let ball = sphere(v(0.1, 0.4, 0.0), 0.25);
-    let rod = cylinder(v(-0.3, 0.2, -0.2), v(0.3, 0.5, 0.0), 0.15);
+    let ball = || sphere(v(0.1, 0.4, 0.0), 0.25);
+    let rod = || cylinder(v(-0.3, 0.2, -0.2), v(0.3, 0.5, 0.0), 0.15);
     let small = |x: f64| sphere(v(x, 0.4, 0.0), 0.2);
     let bubble = Bsdf::Dielectric {
         ior: 1.0 / 1.52,
@@ -38,11 +38,11 @@ fn objects_without_loss_are_invisible_in_the_white_dome() {
     };
     let scenes: [(&str, Vec<(Shape, Bsdf)>); 10] = [
         ("empty", vec![]),
-        ("white sphere", vec![(ball, grey(1.0))]),
-        ("mirror sphere", vec![(ball, MIRROR)]),
-        ("glass sphere", vec![(ball, GLASS)]),
-        ("white cylinder", vec![(rod, grey(1.0))]),
-        ("glass cylinder", vec![(rod, GLASS)]),
+        ("white sphere", vec![(ball(), grey(1.0))]),
+        ("mirror sphere", vec![(ball(), MIRROR)]),
+        ("glass sphere", vec![(ball(), GLASS)]),
+        ("white cylinder", vec![(rod(), grey(1.0))]),
+        ("glass cylinder", vec![(rod(), GLASS)]),
         (
             "touching glass",
             vec![(small(-0.2), GLASS), (small(0.2), GLASS)],
@@ -53,7 +53,7 @@ fn objects_without_loss_are_invisible_in_the_white_dome() {
         ),
         (
             "glass shell",
-            vec![(ball, GLASS), (sphere(v(0.1, 0.4, 0.0), 0.2499), bubble)],
+            vec![(ball(), GLASS), (sphere(v(0.1, 0.4, 0.0), 0.2499), bubble)],
         ),
         (
             "glass cylinder on a mirror disk",

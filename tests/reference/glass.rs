@@ -17,7 +17,9 @@ fn through(things: &[(Shape, Bsdf)]) -> Build {
     let scene = small(v(0.0, 5.0, 0.0), DVec3::ZERO, 0.1);
     things
         .iter()
-        .fold(scene, |scene, &(shape, bsdf)| scene.add(shape, bsdf))
+        .fold(scene, |scene, (shape, bsdf)| {
+            scene.add(shape.clone(), *bsdf)
+        })
         .light(v(0.0, -5.0, 0.0), DVec3::Y, 3.0, 1.0)
 }
 
@@ -85,7 +87,7 @@ fn glass_resting_on_the_floor_has_a_gap_of_no_width() {
         .add(cylinder(DVec3::ZERO, DVec3::Y, 0.5), GLASS)
         .light(v(0.0, 4.0, 0.0), -DVec3::Y, 1.0, 1.0);
     let world = scene.world();
-    let rod = world.primitives[0];
+    let rod = &world.primitives[0];
     assert!(matches!(rod.geometry, Geometry::Cylinder { .. }));
 
     let top = world.intersect(&ray(v(0.1, 3.0, 0.2), -DVec3::Y)).unwrap();
@@ -153,7 +155,7 @@ fn nested_solids_know_their_parents_in_any_order() {
         let world = order
             .iter()
             .fold(small(v(0.0, 9.0, 0.0), DVec3::ZERO, 40.0), |b, &i| {
-                b.add(all[i], GLASS)
+                b.add(all[i].clone(), GLASS)
             })
             .light(v(0.0, 8.0, 0.0), -DVec3::Y, 1.0, 1.0)
             .world();

@@ -10,7 +10,9 @@ fn scene_of(eye: DVec3, things: &[(Shape, Bsdf)]) -> Build {
     let scene = small(eye, eye + v(0.3, 0.1, 1.0), 60.0);
     things
         .iter()
-        .fold(scene, |scene, &(shape, bsdf)| scene.add(shape, bsdf))
+        .fold(scene, |scene, (shape, bsdf)| {
+            scene.add(shape.clone(), *bsdf)
+        })
         .light(v(50.0, 50.0, 50.0), DVec3::Y, 1.0, 1.0)
 }
 
@@ -159,7 +161,7 @@ fn disks_are_two_sided_and_glass_needs_the_right_medium() {
             assert_eq!(world.intersect(&away), None);
         }
     }
-    let glass = world.primitives[1];
+    let glass = &world.primitives[1];
     let near = |hit: Option<Hit>| hit.map(|h| (h.t * 1e9).round() / 1e9);
     let mut r = ray(v(5.0, 0.0, 4.0), -DVec3::Z);
     assert_eq!(near(world.intersect(&r)), Some(3.0), "enters");
@@ -196,8 +198,8 @@ fn rooms_of_huge_spheres_and_of_planes_are_the_same() {
         // A light as near as the walls, or the spheres would not be huge beside it.
         build.0.lights[0].center = v(0.0, 0.5, 0.0);
         let round = build.world();
-        let huge = |g: Geometry| matches!(g, Geometry::HugeSphere { .. });
-        assert!(round.primitives.iter().all(|p| huge(p.geometry)));
+        let huge = |g: &Geometry| matches!(g, Geometry::HugeSphere { .. });
+        assert!(round.primitives.iter().all(|p| huge(&p.geometry)));
         for d in directions(2000) {
             let (a, b) = (flat.intersect(&ray(eye, d)), round.intersect(&ray(eye, d)));
             let (a, b) = (a.unwrap(), b.unwrap());

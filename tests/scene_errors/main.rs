@@ -1,6 +1,7 @@
 //! Every rule of the scene format, broken once: file, line, column, value and rule are named.
 
 mod files;
+mod implicit;
 mod reading;
 mod structure;
 mod values;

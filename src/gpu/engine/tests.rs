@@ -95,7 +95,12 @@ fn samples_that_are_not_finite_are_left_out_and_counted_by_replicate() {
 /// A film of `samples` of a hall of a hundred lamps, on a driver that grants `trips` loop trips.
 fn hall(trips: u64, samples: Range<u64>) -> Result<(Film, Counters), EngineError> {
     let text = crate::scene::generate::lights(100, 0, "").scene;
-    let scene = parse::parse_str("hall.toml".as_ref(), &text).expect("a scene");
+    counted(&text, trips, samples)
+}
+
+/// A film of `samples` of a scene whose kernel counts its loop trips.
+fn counted(text: &str, trips: u64, samples: Range<u64>) -> Result<(Film, Counters), EngineError> {
+    let scene = parse::parse_str("counted.toml".as_ref(), text).expect("a scene");
     let flags = Overrides {
         size: Some([16, 12]),
         ..Overrides::default()
@@ -105,7 +110,7 @@ fn hall(trips: u64, samples: Range<u64>) -> Result<(Film, Counters), EngineError
     let mut gpu = Gpu::open(&Choice::default()).expect("an adapter");
     gpu.trip_limit = trips;
     let mut engine = GpuEngine::on(gpu, &world, &settings, None).expect("an engine");
-    assert_eq!(engine.kernel().access, Access::Tree);
+    assert_eq!(engine.kernel().trips_per_sample, 0);
     let rect = Rect::whole([16, 12]);
     let mut film = Film::new([16, 12], rect, settings.strata);
     let stop = AtomicBool::new(false);
@@ -120,6 +125,15 @@ fn want_of_loop_trips_changes_no_bit() {
     assert_eq!(plenty.0, scant.0);
     assert_eq!(plenty.1, scant.1);
     assert_eq!(plenty.1.paths, 40 * 192);
+}
+
+#[test]
+fn want_of_loop_trips_changes_no_bit_of_a_formula() {
+    let text = include_str!("../../../scenes/torus.toml");
+    let plenty = counted(text, 60_000, 0..40).expect("samples");
+    let scant = counted(text, 4_000, 0..40).expect("samples, a few at a time");
+    assert_eq!(plenty.0, scant.0);
+    assert_eq!(plenty.1.paths, scant.1.paths);
 }
 
 #[test]

@@ -66,6 +66,10 @@ impl Chains {
                 let half = (offsets[1] - offsets[0]) / 2.0;
                 ball(base + axis * half, half.hypot(radius))
             }
+            Geometry::Implicit(ref implicit) => {
+                let (center, radius) = implicit.ball();
+                ball(center, radius)
+            }
             Geometry::Plane { .. } | Geometry::HugeSphere { .. } => Some(FilmBox::whole(size)),
         });
         Self {

@@ -72,7 +72,9 @@ fn leaf(shape: ShapeKind, s: &Surface, item: u32) -> Unit {
             let last = [s.top.to_bits(), s.solid, s.parent, item];
             [point, axis, [x, y, z, 0], last]
         }
-        ShapeKind::Plane | ShapeKind::HugeSphere => unreachable!("it has no bounds"),
+        ShapeKind::Plane | ShapeKind::HugeSphere | ShapeKind::Implicit => {
+            unreachable!("none is in a tree")
+        }
     }
 }
 

@@ -159,7 +159,7 @@ pub(in crate::kernel) fn targets(world: &World) -> Vec<Target> {
 fn function(p: &WorldPrimitive) -> Function {
     let shape = ShapeKind::of(&p.geometry);
     let variant = match (shape, p.side) {
-        (ShapeKind::Disk, _) => Variant::Hit,
+        (ShapeKind::Disk | ShapeKind::Implicit, _) => Variant::Hit,
         (_, Side::Both) => Variant::Boundary,
         (ShapeKind::Plane, _) => Variant::Front,
         (_, Side::Outside) => Variant::Outside,
@@ -206,6 +206,13 @@ fn calls(s: &mut String, world: &World, list: &[Target], access: Access, nearest
         }
         Access::Buffers | Access::Tree => {
             for run in list.chunk_by(|a, b| a.function == b.function && a.number + 1 == b.number) {
+                if run[0].function.shape == ShapeKind::Implicit {
+                    // Each has a function of its own.
+                    for target in run {
+                        let _ = writeln!(s, "    hit = {};", baked_call(world, target));
+                    }
+                    continue;
+                }
                 let (begin, end) = (run[0].number, run[run.len() - 1].number + 1);
                 let call = run[0].function.call("hit", |f| format!("s.{f}"), "i * 4u");
                 let _ = write!(
@@ -264,6 +271,9 @@ fn pair_call(world: &World, a: &Target, b: &Target) -> String {
 }
 
 fn baked_call(world: &World, t: &Target) -> String {
+    if t.function.shape == ShapeKind::Implicit {
+        return format!("{}(hit, ray)", super::implicit::name(t.number));
+    }
     let mut surface = Surface::of(world, t.number);
     if t.function.shape == ShapeKind::Disk && !points_up(surface.axis.map(f64::from).into()) {
         // A disk is two-sided, so its normal may be turned. If all normals point the same way, parallel disks share their quotients.

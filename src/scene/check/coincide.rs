@@ -90,7 +90,7 @@ fn things(scene: &Scene) -> Vec<Thing> {
     let primitives = scene.primitives.iter().map(|p| Thing {
         kind: p.shape.kind(),
         place: p.place(),
-        shape: Some(p.shape),
+        shape: Some(p.shape.clone()),
         material: Some(p.material),
         dielectric: is_dielectric(scene, p),
         faces: faces(&p.shape),
@@ -100,7 +100,7 @@ fn things(scene: &Scene) -> Vec<Thing> {
 
 fn faces(shape: &Shape) -> Vec<Face> {
     let rank = match shape {
-        Shape::Sphere { .. } => Rank::Curved,
+        Shape::Sphere { .. } | Shape::Implicit(_) => Rank::Curved,
         Shape::Plane { .. } => Rank::Plane,
         Shape::Disk { .. } => Rank::Disk,
         Shape::Cylinder { .. } => Rank::Cap,

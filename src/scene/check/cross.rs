@@ -3,6 +3,7 @@
 use super::geometry::{farthest_on_cylinder, points_on_disk, signed_distance, size};
 use super::{Warnings, called, is_dielectric};
 use crate::coincidence::{COINCIDENT, parallel, slack};
+use crate::implicit::Implicit;
 use crate::scene::{Scene, Shape};
 use glam::DVec3;
 
@@ -31,15 +32,17 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
 /// Whether the surfaces cross, by more than the tolerance within which they coincide.
 fn cross(a: &Shape, b: &Shape) -> bool {
     let slack = slack(size(a).min(size(b)));
-    match (*a, *b) {
-        (Shape::Plane { normal: n, .. }, Shape::Plane { normal: m, .. }) => {
+    match (a, b) {
+        (Shape::Implicit(solid), _) => overlap(solid, b),
+        (_, Shape::Implicit(solid)) => overlap(solid, a),
+        (&Shape::Plane { normal: n, .. }, &Shape::Plane { normal: m, .. }) => {
             !parallel(n, m, COINCIDENT)
         }
-        (Shape::Plane { .. }, _) => cross(b, a),
-        (Shape::Sphere { center, radius }, Shape::Plane { .. }) => {
+        (&Shape::Plane { .. }, _) => cross(b, a),
+        (&Shape::Sphere { center, radius }, &Shape::Plane { .. }) => {
             signed_distance(b, center).abs() < radius - slack
         }
-        (Shape::Cylinder { base, top, radius }, Shape::Plane { normal, .. }) => {
+        (&Shape::Cylinder { base, top, radius }, &Shape::Plane { normal, .. }) => {
             // How far a cap reaches along the normal.
             let reach = radius * normal.cross((top - base).normalize()).length();
             let ends = [signed_distance(b, base), signed_distance(b, top)];
@@ -48,8 +51,8 @@ fn cross(a: &Shape, b: &Shape) -> bool {
             low < -slack && high > slack
         }
         (
-            Shape::Sphere { center, radius },
-            Shape::Sphere {
+            &Shape::Sphere { center, radius },
+            &Shape::Sphere {
                 center: other,
                 radius: r,
             },
@@ -58,8 +61,8 @@ fn cross(a: &Shape, b: &Shape) -> bool {
             apart > (radius - r).abs() + slack && apart < radius + r - slack
         }
         (
-            Shape::Sphere { center, radius },
-            Shape::Cylinder {
+            &Shape::Sphere { center, radius },
+            &Shape::Cylinder {
                 base,
                 top,
                 radius: r,
@@ -70,12 +73,50 @@ fn cross(a: &Shape, b: &Shape) -> bool {
             let farthest = farthest_on_cylinder(base, top, r, center);
             nearest < radius - slack && farthest > radius + slack
         }
-        (Shape::Cylinder { .. }, Shape::Sphere { .. }) => cross(b, a),
-        (Shape::Cylinder { .. }, Shape::Cylinder { .. }) => {
+        (&Shape::Cylinder { .. }, &Shape::Sphere { .. }) => cross(b, a),
+        (&Shape::Cylinder { .. }, &Shape::Cylinder { .. }) => {
             partly_inside(a, b, slack) || partly_inside(b, a, slack)
         }
-        (Shape::Disk { .. }, _) | (_, Shape::Disk { .. }) => false,
+        (&Shape::Disk { .. }, _) | (_, &Shape::Disk { .. }) => false,
     }
+}
+
+/// Whether the two have points in common, and each has points of its own, well inside: by a grid over both.
+fn overlap(solid: &Implicit, other: &Shape) -> bool {
+    const SIDE: usize = 24;
+    let (center, radius) = solid.ball();
+    let (mut low, mut high) = (center - radius, center + radius);
+    // What has no bounds has points of its own.
+    let mut own = [false, true];
+    let ball = match other {
+        Shape::Sphere { center, radius } => Some((*center, *radius)),
+        Shape::Cylinder { base, top, radius } => Some((
+            0.5 * (*base + *top),
+            radius.hypot(0.5 * base.distance(*top)),
+        )),
+        Shape::Implicit(other) => Some(other.ball()),
+        Shape::Plane { .. } | Shape::Disk { .. } => None,
+    };
+    if let Some((center, radius)) = ball {
+        if center.distance(solid.ball().0) > radius + solid.ball().1 {
+            return false;
+        }
+        (low, high) = (low.min(center - radius), high.max(center + radius));
+        own[1] = false;
+    }
+    let this = Shape::Implicit(solid.clone().into());
+    let margin = slack(size(&this).min(size(other)));
+    let mut both = false;
+    for k in 0..SIDE.pow(3) {
+        let at = [k % SIDE, k / SIDE % SIDE, k / SIDE / SIDE];
+        let at = DVec3::from_array(at.map(|n| (n as f64 + 0.5) / SIDE as f64));
+        let p = low + (high - low) * at;
+        let [a, b] = [&this, other].map(|s| signed_distance(s, p));
+        both |= a < -margin && b < -margin;
+        own[0] |= a < -margin && b > margin;
+        own[1] |= b < -margin && a > margin;
+    }
+    both && own[0] && own[1]
 }
 
 /// Whether some points of `a`'s surface are inside `b`, and some outside.
@@ -96,11 +137,11 @@ fn points_on_cylinder(a: &Shape, b: &Shape) -> Vec<DVec3> {
     const FINENESS: usize = 32;
 
     let (
-        Shape::Cylinder { base, top, radius },
+        &Shape::Cylinder { base, top, radius },
         &Shape::Cylinder {
             base: b0, top: b1, ..
         },
-    ) = (*a, b)
+    ) = (a, b)
     else {
         return Vec::new();
     };

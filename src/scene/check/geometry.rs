@@ -1,6 +1,7 @@
 //! Distances and hits in f64. Only the lints use them, never rendering.
 
 use crate::coincidence::{COINCIDENT, parallel};
+use crate::implicit::roots::Start;
 use crate::scene::{Light, Shape};
 use glam::DVec3;
 
@@ -50,6 +51,19 @@ pub(super) fn signed_distance(shape: &Shape, p: DVec3) -> f64 {
                 above.max(0.0).hypot(beside.max(0.0))
             }
         }
+        Shape::Implicit(ref implicit) => {
+            let q = implicit.to_local(p);
+            let (height, gradient) = implicit.sloped(q);
+            // To first order.
+            let distance = height / gradient.length().max(f64::MIN_POSITIVE);
+            let beyond = -implicit.clip.depth(q);
+            let distance = if implicit.closed {
+                distance.max(beyond)
+            } else {
+                distance.abs().max(beyond)
+            };
+            distance * implicit.scale
+        }
     }
 }
 
@@ -79,6 +93,10 @@ pub(super) fn reach(shape: &Shape, point: DVec3, normal: DVec3) -> f64 {
         Shape::Cylinder { base, top, radius } => {
             height(base).max(height(top)) + rim((top - base).normalize(), radius)
         }
+        Shape::Implicit(ref implicit) => {
+            let (center, radius) = implicit.ball();
+            height(center) + radius
+        }
     }
 }
 
@@ -88,6 +106,7 @@ pub(super) fn size(shape: &Shape) -> f64 {
         Shape::Plane { .. } => f64::INFINITY,
         Shape::Sphere { radius, .. } | Shape::Disk { radius, .. } => radius,
         Shape::Cylinder { base, top, radius } => radius.min(base.distance(top)),
+        Shape::Implicit(ref implicit) => implicit.ball().1,
     }
 }
 
@@ -151,6 +170,10 @@ pub(super) fn hit(shape: &Shape, o: DVec3, d: DVec3) -> Option<f64> {
             };
             let (enter, leave) = (caps.0.max(side.0), caps.1.min(side.1));
             (enter < leave).then(|| first(enter, leave)).flatten()
+        }
+        Shape::Implicit(ref implicit) => {
+            let inside = implicit.holds(o);
+            implicit.meet(o, d, Start { inside, on: None }).map(|h| h.0)
         }
     }
 }

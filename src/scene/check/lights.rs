@@ -4,6 +4,7 @@ use super::coincide::ROUNDING;
 use super::geometry::{disk_of, hit, points_on_disk, reach, signed_distance};
 use super::{Warnings, called, is_dielectric};
 use crate::coincidence::{COINCIDENT, in_plane, slack};
+use crate::implicit::DiskPlace;
 use crate::scene::{Light, Primitive, Scene, Shape};
 use glam::DVec3;
 
@@ -27,7 +28,7 @@ pub(super) fn black(scene: &Scene) -> Warnings {
 /// Lights with something opaque directly in front of at least half of their face.
 pub(super) fn covered(scene: &Scene) -> Warnings {
     let opaque = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
-    let primitives = opaque.map(|p| (p.shape, p.shape.kind(), p.line));
+    let primitives = opaque.map(|p| (p.shape.clone(), p.shape.kind(), p.line));
     let lights = scene.lights.iter().map(|l| (disk_of(l), "light", l.line));
     let covers: Vec<(Shape, &str, usize)> = primitives.chain(lights).collect();
 
@@ -145,6 +146,11 @@ fn hidden_by(shape: &Shape, l: &Light, eye: DVec3) -> Option<&'static str> {
                 return Some("is inside");
             }
             faces_into_cap(shape, l, slack).then_some("lies on and faces into")
+        }
+        Shape::Implicit(ref solid) => {
+            let place = || solid.place_of_disk(l.center, l.normal, l.radius);
+            let hides = solid.closed && !solid.holds(eye) && place() == DiskPlace::Inside;
+            hides.then_some("is inside")
         }
         Shape::Disk { .. } => None,
     }

@@ -15,7 +15,7 @@ const MIN_RAYS: usize = 20;
 pub(super) fn warnings(scene: &Scene) -> Warnings {
     let opaque = scene.primitives.iter().filter(|p| !is_dielectric(scene, p));
     let lights = scene.lights.iter().map(disk_of);
-    let mut shapes: Vec<Shape> = opaque.map(|p| p.shape).chain(lights).collect();
+    let mut shapes: Vec<Shape> = opaque.map(|p| p.shape.clone()).chain(lights).collect();
     // Walls come first, because they stop most rays.
     shapes.sort_by_key(|s| !matches!(s, Shape::Plane { .. }));
 

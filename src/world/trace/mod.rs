@@ -20,6 +20,7 @@ pub use camera::camera_ray;
 pub use finder::Finder;
 
 use super::{AIR, Geometry, Side, World, WorldPrimitive};
+use crate::implicit::roots::Start;
 use crate::scene::Bsdf;
 use cylinder::Cylinder;
 use dielectric::Boundary;
@@ -119,10 +120,11 @@ impl World {
             }
             Some(p) => is_inside(p, ray.medium).and_then(|inside| {
                 let (t, face) = meet(p, inside, ray).filter(|&(t, _)| is_first(t))?;
-                let (point, outward) = surface(p, face, ray.at(t));
-                let turn = match p.geometry {
-                    Geometry::Disk { .. } => outward.dot(ray.direction) > 0.0,
-                    _ => inside,
+                let (point, outward) = surface(p, face, ray, t);
+                let turn = if p.geometry.is_sheet() {
+                    outward.dot(ray.direction) > 0.0
+                } else {
+                    inside
                 };
                 Some(Hit {
                     t,
@@ -247,12 +249,18 @@ fn meet(p: &WorldPrimitive, inside: bool, ray: &Ray) -> Option<(f64, usize)> {
                 solid.enter(ray)
             }
         }
+        Geometry::Implicit(ref implicit) => {
+            let on = (0..2).find(|&part| ray.face == p.faces[part]);
+            implicit.meet(ray.origin, ray.direction, Start { inside, on })
+        }
     }
 }
 
-/// `point` moved onto face number `face` of `p`, and the outward unit normal there.
-fn surface(p: &WorldPrimitive, face: usize, point: DVec3) -> (DVec3, DVec3) {
+/// Where `ray` meets face number `face` of `p`, at distance `t`: the point, moved onto the face, and the outward unit normal there.
+fn surface(p: &WorldPrimitive, face: usize, ray: &Ray, t: f64) -> (DVec3, DVec3) {
+    let point = ray.at(t);
     match p.geometry {
+        Geometry::Implicit(ref implicit) => implicit.project(face, point, -ray.direction),
         Geometry::Disk { normal, offset, .. } | Geometry::Plane { normal, offset } => {
             (plane::project(normal, offset, point), normal)
         }

@@ -1,0 +1,332 @@
+//! Where a ray meets an implicit surface, in f64: by bisection, with intervals of the function and of its derivative along the ray.
+//!
+//! The kernels do it in another way, which `shaders/shape/implicit.wgsl` describes.
+
+use super::Implicit;
+use super::arithmetic::Arithmetic as _;
+use super::interval::{Interval, Varying};
+use glam::DVec3;
+
+/// The part of a closed surface that its formula makes.
+pub const SURFACE: usize = 0;
+/// The part where the bounds cut off the solid.
+pub const CAP: usize = 1;
+
+/// Parts of the ray that are smaller than this, relative to the size of the surface, are not divided any further.
+const FINEST: f64 = 1.0 / (1u64 << 42) as f64;
+
+/// A point that is nearer to the surface than this, relative to its size, is on it.
+const ON_IT: f64 = 1e-10;
+
+/// The most parts of a ray that are looked at.
+const MOST_PARTS: usize = 1 << 20;
+
+/// What is known of the place where a ray starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Start {
+    /// Whether that is inside the solid. Of no meaning for a surface that is not closed.
+    pub inside: bool,
+    /// The part of the surface that it stands on.
+    pub on: Option<usize>,
+}
+
+/// The function along a ray in its own space.
+struct Along<'a> {
+    implicit: &'a Implicit,
+    q: DVec3,
+    w: DVec3,
+    /// 1 if the ray starts where the function is positive, or -1: it looks for a place where the sign changes.
+    sign: f64,
+    /// The length below which parts are not divided.
+    finest: f64,
+}
+
+impl Along<'_> {
+    /// The function and its derivative between two places, times the sign.
+    fn over(&self, low: f64, high: f64) -> Varying {
+        let t = Varying {
+            value: Interval::new(low, high),
+            slope: Interval::number(1.0),
+        };
+        let at = |k: usize| {
+            let slope = Varying::number(self.w[k]);
+            t.multiply(slope).add(Varying::number(self.q[k]))
+        };
+        let value = self.implicit.formula().evaluate([at(0), at(1), at(2)]);
+        let height = value.subtract(Varying::number(self.implicit.level));
+        if self.sign < 0.0 {
+            height.negate()
+        } else {
+            height
+        }
+    }
+
+    /// The function at a place, times the sign.
+    fn at(&self, t: f64) -> f64 {
+        self.sign * self.implicit.height(self.q + self.w * t)
+    }
+
+    /// Its derivative.
+    fn slope(&self, t: f64) -> f64 {
+        self.sign * self.implicit.sloped(self.q + self.w * t).1.dot(self.w)
+    }
+
+    /// The root between `low`, where the function is positive, and `high`, where it is negative and has fallen all the way.
+    fn bisect(&self, mut low: f64, mut high: f64) -> f64 {
+        for _ in 0..80 {
+            let middle = 0.5 * (low + high);
+            if self.at(middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+
+    /// The first place from `low` to `high` at which the function is not positive any more.
+    fn first(&self, low: f64, high: f64) -> Option<f64> {
+        let mut parts = vec![(low, high)];
+        let mut left = MOST_PARTS;
+        while let Some((low, high)) = parts.pop() {
+            let Varying { value, slope } = self.over(low, high);
+            if value.low > 0.0 {
+                continue;
+            }
+            if value.high < 0.0 || left == 0 {
+                return Some(low);
+            }
+            left -= 1;
+            if slope.low > 0.0 {
+                if self.over(low, low).value.high < 0.0 {
+                    return Some(low);
+                }
+                continue;
+            }
+            if slope.high < 0.0 {
+                if self.at(high) < 0.0 {
+                    return Some(self.bisect(low, high));
+                }
+                continue;
+            }
+            let middle = 0.5 * (low + high);
+            if high - low > self.finest {
+                parts.push((middle, high));
+                parts.push((low, middle));
+            } else if self.slope(low) <= 0.0 {
+                return Some(low);
+            }
+        }
+        None
+    }
+
+    /// How far from a root at 0 there is certainly no other, at most `end`.
+    fn beyond_start(&self, end: f64) -> f64 {
+        let mut t = end;
+        while t > self.finest {
+            if self.over(0.0, t).slope.low > 0.0 {
+                return t;
+            }
+            t *= 0.5;
+        }
+        t
+    }
+}
+
+impl Implicit {
+    /// Where the ray o + t d first meets the surface, at t >= 0, and the part that it meets there.
+    pub fn meet(&self, o: DVec3, d: DVec3, start: Start) -> Option<(f64, usize)> {
+        let (q, w) = (self.to_local(o), self.turned_back(d));
+        let span = self.clip.span(q, w);
+        let along = |sign: f64| Along {
+            implicit: self,
+            q,
+            w,
+            sign,
+            finest: FINEST * self.ball().1,
+        };
+        // The first root of a ray that stands on one, or on none.
+        let first = |along: Along, from: f64, to: f64| {
+            let from = if start.on == Some(SURFACE) && from == 0.0 {
+                along.beyond_start(to)
+            } else {
+                from
+            };
+            along.first(from, to)
+        };
+        if self.closed && start.inside {
+            let leave = span.map_or(0.0, |s| s[1].max(0.0));
+            let root = first(along(-1.0), 0.0, leave);
+            return Some(root.map_or((leave, CAP), |t| (t, SURFACE)));
+        }
+        let [enter, leave] = span.filter(|s| s[1] > 0.0)?;
+        let from = enter.max(0.0);
+        if !self.closed {
+            let at = along(1.0);
+            let value = if start.on == Some(SURFACE) && from == 0.0 {
+                at.slope(0.0)
+            } else {
+                at.at(from)
+            };
+            let root = first(along(if value < 0.0 { -1.0 } else { 1.0 }), from, leave);
+            return root.map(|t| (t, SURFACE));
+        }
+        if start.on == Some(CAP) {
+            return None;
+        }
+        if start.on.is_none() {
+            let (height, gradient) = self.sloped(q + w * from);
+            let depth = -height / gradient.length().max(1e-30);
+            if enter > 0.0 && depth > 0.0 {
+                return Some((enter, CAP));
+            }
+            if depth > 0.0 && depth > ON_IT * self.clip.radius() {
+                // Rounding has put the ray inside: it meets what is nearest.
+                let by_cap = self.clip.depth(q) < depth;
+                return Some((0.0, if by_cap { CAP } else { SURFACE }));
+            }
+            if depth.abs() <= ON_IT * self.clip.radius() && from == 0.0 {
+                if gradient.dot(w) < 0.0 {
+                    return Some((0.0, SURFACE));
+                }
+                let at = along(1.0);
+                let root = at.first(at.beyond_start(leave), leave);
+                return root.map(|t| (t, SURFACE));
+            }
+        }
+        first(along(1.0), from, leave).map(|t| (t, SURFACE))
+    }
+
+    /// `p` moved onto part `part` of the surface, and the unit normal there: outward of the solid, or to where the function is greater.
+    /// Where the gradient vanishes, the normal is `otherwise`.
+    pub fn project(&self, part: usize, p: DVec3, otherwise: DVec3) -> (DVec3, DVec3) {
+        let mut q = self.to_local(p);
+        let normal = if part == CAP {
+            let (on, normal) = self.clip.project(q);
+            q = on;
+            normal
+        } else {
+            // Newton's method along the gradient. Far from a root it would lead away.
+            let reach = 1e-3 * self.clip.radius();
+            for _ in 0..2 {
+                let (height, gradient) = self.sloped(q);
+                let step = gradient * (height / gradient.length_squared().max(1e-300));
+                if step.length() < reach {
+                    q -= step;
+                }
+            }
+            self.sloped(q).1
+        };
+        let normal = (self.rotation * normal).normalize_or(otherwise);
+        (self.to_world(q), normal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Clip;
+    use super::*;
+
+    const FREE: Start = Start {
+        inside: false,
+        on: None,
+    };
+
+    fn of(text: &str, radius: f64) -> Implicit {
+        let mut implicit = Implicit::new(text, &[]).expect("a formula");
+        implicit.clip = Clip::Ball { radius };
+        implicit
+    }
+
+    #[test]
+    fn a_ball_is_met_where_it_is() {
+        let mut ball = of("x^2 + y^2 + z^2 - 1", 2.0);
+        (ball.center, ball.scale) = (DVec3::new(1.0, 2.0, 3.0), 0.5);
+        for k in 0..500 {
+            let miss = 0.55 * f64::from(k) / 500.0;
+            let o = ball.center + DVec3::new(-3.0, miss, 0.0);
+            let expected = (miss <= 0.5).then(|| 3.0 - (0.25 - miss * miss).sqrt());
+            let found = ball.meet(o, DVec3::X, FREE).map(|h| h.0);
+            match (found, expected) {
+                (Some(a), Some(b)) => assert!((a - b).abs() < 1e-7, "{miss}: {a} {b}"),
+                _ => assert_eq!(found, expected, "{miss}"),
+            }
+        }
+    }
+
+    #[test]
+    fn glancing_chords_are_as_long_as_they_are() {
+        let ball = of("x^2 + y^2 + z^2 - 1", 2.0);
+        for k in 1..60 {
+            let slope = 0.75f64.powi(k);
+            let d = DVec3::new(-slope, 1.0, 0.0).normalize();
+            let start = |inside| Start {
+                inside,
+                on: Some(SURFACE),
+            };
+            let (t, part) = ball.meet(DVec3::X, d, start(true)).expect("inside");
+            assert!(
+                (t + 2.0 * d.x).abs() < 1e-9 + 1e-15 / slope && part == SURFACE,
+                "{slope}: {t}"
+            );
+            assert_eq!(
+                ball.meet(DVec3::X, DVec3::new(slope, 1.0, 0.0), start(false)),
+                None
+            );
+        }
+    }
+
+    #[test]
+    fn thin_shells_and_double_roots_are_not_missed() {
+        let shell = of("abs(sqrt(x^2 + y^2 + z^2) - 1) - 0.0005", 2.0);
+        let sheet = of("(x^2 + y^2 + z^2 - 1)^2", 2.0);
+        for k in 0..300 {
+            let y = f64::from(k) / 301.0;
+            let o = DVec3::new(-3.0, y, 0.0);
+            let at = |radius: f64| 3.0 - (radius * radius - y * y).sqrt();
+            let (t, _) = shell.meet(o, DVec3::X, FREE).expect("met");
+            assert!((t - at(1.0005)).abs() < 1e-9, "{y}: {t}");
+            let on = shell.project(SURFACE, o + DVec3::X * t, DVec3::X).0;
+            let inside = Start {
+                inside: true,
+                on: Some(SURFACE),
+            };
+            let (through, _) = shell.meet(on, DVec3::X, inside).expect("met");
+            assert!((t + through - at(0.9995)).abs() < 1e-9, "{y}: {through}");
+            let (t, _) = sheet.meet(o, DVec3::X, FREE).expect("met");
+            assert!((t - at(1.0)).abs() < 1e-6, "{y}: {t}");
+        }
+    }
+
+    #[test]
+    fn bounds_are_caps_of_solids_and_rims_of_others() {
+        let mut tube = of("x^2 + y^2 - 1", 1.0);
+        tube.clip = Clip::Box {
+            min: DVec3::new(-2.0, -2.0, -1.0),
+            max: DVec3::new(2.0, 2.0, 1.0),
+        };
+        let down = |x: f64, inside, on| {
+            tube.meet(DVec3::new(x, 0.0, 3.0), -DVec3::Z, Start { inside, on })
+        };
+        assert_eq!(down(0.5, false, None), Some((2.0, CAP)));
+        assert_eq!(down(1.5, false, None), None);
+        let inside = Start {
+            inside: true,
+            on: None,
+        };
+        assert_eq!(tube.meet(DVec3::ZERO, DVec3::Z, inside), Some((1.0, CAP)));
+        let (p, n) = tube.project(CAP, DVec3::new(0.5, 0.0, 1.0 + 1e-9), DVec3::X);
+        assert_eq!((p.z, n), (1.0, DVec3::Z));
+        tube.closed = false;
+        let slant = DVec3::new(1.0, 0.0, -1.5).normalize();
+        let (t, part) = tube
+            .meet(DVec3::new(0.5, 0.0, 1.5), slant, FREE)
+            .expect("from inside");
+        assert!(part == SURFACE && (t * slant.x - 0.5).abs() < 1e-12);
+        assert_eq!(
+            tube.meet(DVec3::new(0.5, 0.0, 3.0), -DVec3::Z, FREE),
+            None,
+            "through"
+        );
+    }
+}

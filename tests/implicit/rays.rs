@@ -1,0 +1,367 @@
+//! Random rays.
+
+use super::{SURFACES, scene_of};
+use crate::common::{scene, settings};
+use etendue::gpu::probe::{Probe, Uniform, Values};
+use etendue::gpu::{Choice, Gpu};
+use etendue::implicit::Implicit;
+use etendue::kernel::{Access, scene_probe_source};
+use etendue::world::trace::{Met, Ray};
+use etendue::world::{Geometry, World, WorldPrimitive};
+use glam::DVec3;
+use std::sync::LazyLock;
+
+static GPU: LazyLock<Gpu> =
+    LazyLock::new(|| Gpu::open(&Choice::default()).unwrap_or_else(|e| panic!("{e}")));
+
+const BODY: &str = "
+    let ray = Ray(vec3f(x[0], x[1], x[2]), vec3f(x[3], x[4], x[5]), u32(x[6]), u32(x[7]), NO_FACE);
+    let hit = intersect(ray);
+    y[0] = hit.t;
+    y[1] = select(f32(hit.key), -1.0, hit.key == NONE);
+    let v = vertex_at(ray, Hit(hit.t, select(hit.key, LIGHT_KEYS, hit.key == NONE)), surface_at(LIGHT_KEYS));
+    y[2] = v.p.x;
+    y[3] = v.p.y;
+    y[4] = v.p.z;
+    y[5] = v.n.x;
+    y[6] = v.n.y;
+    y[7] = v.n.z;
+    let before = trips_left;
+    let again = intersect(ray);
+    y[8] = f32(before - trips_left) + select(0.0, 1.0e-3, again.key == 7u);
+";
+
+fn vec(x: &[f32]) -> DVec3 {
+    DVec3::new(x[0].into(), x[1].into(), x[2].into())
+}
+
+/// What a batch of rays has shown.
+#[derive(Debug, Default)]
+struct Report {
+    rays: usize,
+    /// Rays that were left out because they may or may not meet the surface on which they stand.
+    at_once: usize,
+    hits: usize,
+    /// The reference meets the surface, and the kernel goes through more than rounding explains.
+    missed: usize,
+    /// The kernel meets what is not there.
+    ghosts: usize,
+    /// Both meet the surface at places that differ.
+    displaced: usize,
+    /// A hit's normal differs.
+    turned: usize,
+    turns: f64,
+    most_turns: f64,
+    example: Option<String>,
+}
+
+/// The distance of a point from the surface, to first order, over the size of the bounds.
+fn off(implicit: &Implicit, p: DVec3) -> f64 {
+    let q = implicit.to_local(p);
+    let (height, gradient) = implicit.sloped(q);
+    let near = |h: f64| h.abs() / gradient.length().max(1e-9) / implicit.clip.radius();
+    // On a cap the height does not matter.
+    near(height).min(implicit.clip.depth(q).abs() / implicit.clip.radius())
+}
+
+fn the_surface(world: &World) -> (&WorldPrimitive, &Implicit) {
+    let p = world.primitives.last().expect("a primitive");
+    match &p.geometry {
+        Geometry::Implicit(implicit) => (p, implicit),
+        _ => panic!("not implicit"),
+    }
+}
+
+/// Rays from anywhere to anywhere near the surface, and rays that start on it.
+fn shoot(world: &World, count: usize, seed: u64) -> Report {
+    let (p, implicit) = the_surface(world);
+    let (center, size) = implicit.ball();
+    let mut r = Uniform(seed);
+    let mut inputs: Vec<Values> = Vec::with_capacity(count);
+    while inputs.len() < count {
+        let mut point = |half: f64| DVec3::from_array([(); 3].map(|()| r.between(-half, half)));
+        let from = center + point(3.0) * size;
+        let to = center + point(0.8) * size;
+        let spread = point(1.0).normalize_or(DVec3::X);
+        let d = (to - from).normalize().as_vec3();
+        let mut ray = Ray {
+            origin: from.as_vec3().as_dvec3(),
+            direction: d.as_dvec3().normalize(),
+            medium: world.camera.medium,
+            face: 0,
+        };
+        // Inside a solid a ray of the right side may start nowhere else.
+        let inside = implicit.holds(ray.origin);
+        if p.side == etendue::world::Side::Outside && inside {
+            continue;
+        }
+        if p.solid > 0 {
+            ray.medium = if inside { p.solid } else { 0 };
+        } else if p.side == etendue::world::Side::Inside {
+            ray.origin = world.camera.eye;
+        }
+        if inputs.len() % 3 == 2 {
+            // From a point of the surface, to either side or the one that there is.
+            let Some(hit) = world.intersect(&ray) else {
+                continue;
+            };
+            let Met::Primitive(_) = hit.met else { continue };
+            let inwards = p.solid > 0 && r.next() < 0.5;
+            let side = if inwards { -hit.normal } else { hit.normal };
+            let away = if spread.dot(side) < 0.0 {
+                -spread
+            } else {
+                spread
+            };
+            // Nearly level, now and then.
+            let away = if r.next() < 0.2 {
+                (away - side * away.dot(side) * 0.99).normalize()
+            } else {
+                away
+            };
+            ray.origin = hit.point.as_vec3().as_dvec3();
+            ray.direction = away.as_vec3().as_dvec3().normalize();
+            ray.face = hit.face;
+            if inwards {
+                ray.medium = if ray.medium == p.solid { 0 } else { p.solid };
+            }
+        }
+        let mut x = Values::default();
+        x[..3].copy_from_slice(&ray.origin.as_vec3().to_array());
+        x[3..6].copy_from_slice(&ray.direction.as_vec3().to_array());
+        (x[6], x[7]) = (ray.face as f32, ray.medium as f32);
+        inputs.push(x);
+    }
+    let access = Access::Baked;
+    let parsed = settings_of(world);
+    let source = scene_probe_source(world, &parsed, access, BODY);
+    let probe =
+        Probe::compile(&GPU, &source, Some(access)).unwrap_or_else(|e| panic!("{e}\n{source}"));
+    let outputs = probe
+        .run(&GPU, Some(world), &inputs)
+        .unwrap_or_else(|e| panic!("{e}"));
+    let mut report = Report::default();
+    for (x, y) in inputs.iter().zip(&outputs) {
+        judge(world, x, y, &mut report);
+    }
+    report.turns /= count as f64;
+    report
+}
+
+fn settings_of(world: &World) -> etendue::Settings {
+    let _ = world;
+    let any = scene(&scene_of(
+        "x",
+        "{ radius = 1 }",
+        "material = 'white'",
+        "[0, 0, 5]",
+    ));
+    settings(&any, [8, 8], 0)
+}
+
+fn judge(world: &World, x: &Values, y: &Values, report: &mut Report) {
+    /// Places nearer than this are one, over the size.
+    const PLACE: f64 = 1e-3;
+    /// Cosines below this are grazing.
+    const GRAZING: f64 = 1e-2;
+    /// What the rounding of f32 explains, over the size.
+    const ROUNDING: f64 = 2e-5;
+
+    let (p, implicit) = the_surface(world);
+    let size = implicit.ball().1;
+    let ray = Ray {
+        origin: vec(&x[..3]),
+        direction: vec(&x[3..6]).normalize(),
+        medium: x[7] as u32,
+        face: x[6] as u32,
+    };
+    // The light is far away, and no matter here.
+    let of_surface = |hit: &etendue::world::trace::Hit| matches!(hit.met, Met::Primitive(_));
+    let expected = world.intersect(&ray).filter(of_surface);
+    let first = 4.0 * world.lights.len() as f32;
+    let found = (y[1] >= first).then_some(f64::from(y[0]));
+    // Of a ray that leaves the surface at a grazing angle, the rounding of its start decides whether it meets the surface at once.
+    let normal = implicit.rotation * implicit.sloped(implicit.to_local(ray.origin)).1;
+    let level = normal.normalize_or_zero().dot(ray.direction).abs() < GRAZING;
+    if ray.face > 0 && level && expected.as_ref().is_some_and(|hit| hit.t < PLACE * size) {
+        report.at_once += 1;
+        return;
+    }
+    // The rim of an open surface is where it is but for the rounding of its bounds.
+    let at_rim = |hit: &etendue::world::trace::Hit| {
+        let depth = implicit.clip.depth(implicit.to_local(hit.point));
+        !implicit.closed && depth.abs() < 0.1 * ROUNDING * implicit.clip.radius()
+    };
+    if expected.as_ref().is_some_and(at_rim) {
+        report.at_once += 1;
+        return;
+    }
+    report.rays += 1;
+    report.hits += usize::from(expected.is_some());
+    report.turns += f64::from(y[8]);
+    report.most_turns = report.most_turns.max(y[8].into());
+    let mut wrong = |count: fn(&mut Report) -> &mut usize, what: String| {
+        *count(report) += 1;
+        if report.example.is_none() {
+            report.example = Some(format!("{ray:?}: {expected:?}, found {found:?}: {what}"));
+        }
+    };
+    // How deep a ray goes between two places where it should have met the surface in between.
+    let deepest = |from: f64, to: f64| {
+        let side = if !implicit.closed {
+            implicit
+                .height(implicit.to_local(ray.at(from + 1e-4 * (to - from))))
+                .signum()
+        } else if p.solid > 0 && ray.medium == p.solid {
+            1.0
+        } else {
+            -1.0
+        };
+        (1..200)
+            .map(|k| ray.at(from + (to - from) * f64::from(k) / 200.0))
+            .filter(|p| implicit.clip.holds(implicit.to_local(*p)))
+            .filter(|p| implicit.height(implicit.to_local(*p)) * side > 0.0)
+            .map(|p| off(implicit, p))
+            .fold(0.0, f64::max)
+    };
+    match (&expected, found) {
+        (None, None) => {}
+        (Some(hit), None) => {
+            let deep = deepest(hit.t, hit.t + 3.0 * size);
+            if deep > ROUNDING {
+                wrong(|r| &mut r.missed, format!("{deep:e} deep"));
+            }
+        }
+        (Some(hit), Some(t)) if t > hit.t + PLACE * size => {
+            let deep = deepest(hit.t, t);
+            if deep > ROUNDING {
+                wrong(|r| &mut r.missed, format!("{deep:e} deep"));
+            }
+        }
+        (expected, Some(t)) => {
+            let early = expected.as_ref().is_none_or(|hit| t < hit.t - PLACE * size);
+            let o = off(implicit, ray.at(t));
+            if early && o > ROUNDING {
+                wrong(|r| &mut r.ghosts, format!("{o:e} off"));
+            } else if !early && o > 20.0 * ROUNDING {
+                wrong(|r| &mut r.displaced, format!("{o:e} off"));
+            }
+            if let Some(hit) = expected.as_ref().filter(|_| !early) {
+                let (p, n) = (vec(&y[2..5]), vec(&y[5..8]));
+                let normal = n * n.dot(hit.normal).signum();
+                // Where the surface bends within the rounding of a place, normals differ.
+                if off(implicit, p) > ROUNDING || !(n.length() - 1.0).abs().le(&1e-4) {
+                    wrong(|r| &mut r.displaced, format!("vertex {p} {n}"));
+                } else if normal.dot(hit.normal) < 0.98
+                    && hit.point.distance(p) < 1e-5 * size
+                    && !near_edge(implicit, p)
+                {
+                    wrong(|r| &mut r.turned, format!("normal {n}"));
+                }
+            }
+        }
+    }
+}
+
+/// Whether the bounds or an edge of the formula are near, where normals change at once.
+fn near_edge(implicit: &Implicit, p: DVec3) -> bool {
+    const NEAR: f64 = 1e-4;
+    let q = implicit.to_local(p);
+    let reach = NEAR * implicit.clip.radius();
+    let normal = |q: DVec3| implicit.sloped(q).1.normalize_or_zero();
+    let mut around = DVec3::AXES
+        .into_iter()
+        .flat_map(|a| [a * reach, -a * reach]);
+    implicit.clip.depth(q).abs() < reach || around.any(|d| normal(q + d).dot(normal(q)) < 0.98)
+}
+
+/// Of each surface, as a solid seen from outside, a solid of glass, and a sheet.
+fn all(count: usize) {
+    let mut failures = Vec::new();
+    for (name, formula, bounds) in SURFACES {
+        for (kind, keys) in [
+            ("solid", "material = 'white'"),
+            ("glass", "material = 'glass'"),
+            ("sheet", "material = 'white'\nclosed = false"),
+            (
+                "turned",
+                "material = 'glass'\nscale = 3\ncenter = [5, 1, -2]\nrotation = { axis = [1, 2, 3], angle = 50 }",
+            ),
+        ] {
+            let text = scene_of(formula, bounds, keys, "[0.3, 0.4, 50]");
+            let world = World::new(&scene(&text), [8, 8]);
+            let report = shoot(&world, count, 1 + count as u64);
+            println!(
+                "{name} {kind}: {} rays, {} hits, {} missed, {} ghosts, {} displaced, {} turned; {:.1} turns, at most {}",
+                report.rays,
+                report.hits,
+                report.missed,
+                report.ghosts,
+                report.displaced,
+                report.turned,
+                report.turns,
+                report.most_turns
+            );
+            assert!(report.hits > report.rays / 20, "{name}: {report:?}");
+            assert!(report.at_once < count / 50, "{name}: {report:?}");
+            if report.missed + report.ghosts + report.displaced + report.turned > 0 {
+                failures.push(format!("{name} {kind}: {report:?}"));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// A sheet that touches the level and does not cross it.
+#[test]
+fn double_roots_are_met_where_they_are() {
+    let text = scene_of(
+        "(x^2 + y^2 + z^2 - 1)^2",
+        "{ radius = 2 }",
+        "material = 'white'\nclosed = false",
+        "[0, 0, 5]",
+    );
+    let world = World::new(&scene(&text), [8, 8]);
+    let access = Access::Baked;
+    let source = scene_probe_source(&world, &settings_of(&world), access, BODY);
+    let probe = Probe::compile(&GPU, &source, Some(access)).unwrap_or_else(|e| panic!("{e}"));
+    let inputs: Vec<Values> = (0..2000)
+        .map(|k| {
+            let y = k as f32 / 2001.0;
+            let mut x = Values::default();
+            x[..6].copy_from_slice(&[-3.0, y, 0.0, 1.0, 0.0, 0.0]);
+            x
+        })
+        .collect();
+    let outputs = probe
+        .run(&GPU, Some(&world), &inputs)
+        .unwrap_or_else(|e| panic!("{e}"));
+    for (x, y) in inputs.iter().zip(&outputs) {
+        let across = f64::from(x[1]);
+        let from_middle = (f64::from(y[0]) - 3.0).hypot(across);
+        // The square of what is off is a rounding of f32.
+        assert!(
+            y[1] >= 0.0 && (from_middle - 1.0).abs() < 2e-3,
+            "{x:?}: {y:?}"
+        );
+        assert!(
+            y[0] < 3.0 || across > 0.99,
+            "the first of two: {x:?}: {y:?}"
+        );
+    }
+}
+
+#[test]
+fn random_rays_meet_what_the_reference_meets() {
+    all(2000);
+}
+
+#[test]
+#[ignore = "takes an hour or two: cargo test --release --test implicit -- --ignored a_million"]
+fn a_million_rays_of_each_surface() {
+    // A quarter for each of the four kinds; ETENDUE_RAYS for fewer.
+    let count = std::env::var("ETENDUE_RAYS")
+        .ok()
+        .and_then(|n| n.parse().ok());
+    all(count.unwrap_or(250_000));
+}
