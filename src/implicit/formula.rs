@@ -176,6 +176,16 @@ impl Graph {
             let power = self.whole_power(base, whole as u32);
             return self.add(Node::Multiply(power, root));
         }
+        // Of a large whole power the sign is that of the base if it is odd.
+        if exponent == whole && exponent % 2.0 == 1.0 {
+            let even = self.power(base, exponent - 1.0);
+            return self.add(Node::Multiply(even, base));
+        }
+        let base = if exponent == whole {
+            self.add(Node::Abs(base))
+        } else {
+            base
+        };
         let log = self.add(Node::Log(base));
         let exponent = self.number(exponent);
         let product = self.add(Node::Multiply(log, exponent));
