@@ -21,6 +21,7 @@ impl std::fmt::Display for Value {
 }
 
 /// The keys whose values are numbers.
+#[cfg(any(feature = "cli", test))]
 pub const NUMBERS: [&str; 9] = [
     "samples",
     "replicates",

@@ -16,8 +16,10 @@ pub use exr::{CHANNELS, Extra, channel_values, write_exr, write_exr_rgb, write_e
 pub use exr_read::{ExrHeader, ExrLayer, Picture, read_exr, read_exr_header, read_exr_layers};
 pub use exr_stated::Moments;
 pub use image_read::{Image, read_image};
+#[cfg(feature = "cli")]
+pub(crate) use metadata::NUMBERS;
 pub use metadata::Value;
-pub(crate) use metadata::{NUMBERS, entries};
+pub(crate) use metadata::entries;
 pub(crate) use pixels::Pixels;
 pub use png::{write_png, write_png_of};
 pub use png_read::{PngHeader, read_png, read_png_header};
