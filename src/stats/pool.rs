@@ -45,16 +45,15 @@ pub fn hollow(values: &[f64], width: usize, sigma: f64) -> Vec<f64> {
     all
 }
 
-/// The sums over the eight neighbours of each pixel.
-pub fn eight(values: &[f64], width: usize) -> Vec<f64> {
+/// The sums over each pixel and its eight neighbours.
+pub fn nine(values: &[f64], width: usize) -> Vec<f64> {
     const ONES: [f64; 3] = [1.0; 3];
     let height = values.len() / width;
     let pixel = |i: usize| {
         let (x, y) = (i % width, i / width);
-        let nine = sum(&ONES, y, height, |v| {
+        sum(&ONES, y, height, |v| {
             sum(&ONES, x, width, |u| values[v * width + u])
-        });
-        nine - values[i]
+        })
     };
     (0..values.len()).into_par_iter().map(pixel).collect()
 }
