@@ -21,7 +21,7 @@ pub enum Download {
     Exr,
     /// With so many stops of exposure.
     Png(f64),
-    /// To go on with.
+    /// The film as it stands, to resume from.
     Film,
 }
 
