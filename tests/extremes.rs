@@ -265,19 +265,35 @@ fn a_thousand_lights_on_one_spot() {
     }
 }
 
-proptest! {
-    // The same scenes every time; PROPTEST_RNG_SEED takes others.
-    #![proptest_config(ProptestConfig {
-        cases: 32,
+/// The same scenes every time; PROPTEST_RNG_SEED takes others.
+fn seeded(cases: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases,
         rng_seed: std::env::var("PROPTEST_RNG_SEED")
             .ok()
             .and_then(|seed| seed.parse().ok())
             .map_or(RngSeed::Fixed(1), RngSeed::Fixed),
         ..ProptestConfig::default()
-    })]
+    }
+}
+
+proptest! {
+    #![proptest_config(seeded(32))]
 
     #[test]
-    fn random_scenes_of_every_magnitude(scene in scenes()) {
+    fn random_scenes_of_every_magnitude(scene in scenes(false)) {
+        let size = scene.camera.resolution;
+        if let Some(fault) = both(&scene, size, Access::Buffers) {
+            prop_assert!(false, "{}", fault);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(seeded(16))]
+
+    #[test]
+    fn random_formulas_of_every_magnitude(scene in scenes(true)) {
         let size = scene.camera.resolution;
         if let Some(fault) = both(&scene, size, Access::Buffers) {
             prop_assert!(false, "{}", fault);

@@ -1,9 +1,11 @@
 //! Random scenes of every size that the format allows.
 
+use etendue::implicit::{Clip, Implicit};
 use etendue::scene::{Bsdf, Camera, Light, Material, Place, Primitive, RenderHints, Scene, Shape};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use proptest::collection::vec;
 use proptest::prelude::*;
+use std::sync::Arc;
 
 /// Coordinates of every magnitude that is allowed.
 fn coordinate() -> impl Strategy<Value = f64> {
@@ -64,6 +66,69 @@ fn shape() -> impl Strategy<Value = Shape> {
     ]
 }
 
+/// Trees of everything that a formula may hold: most have no surface that anyone would want, poles and jumps among them.
+fn formula() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        6 => prop::sample::select(vec!["x", "y", "z", "a"]).prop_map(str::to_owned),
+        1 => Just("pi".to_owned()),
+        2 => (-10.0..10.0f64, -3..=3i32).prop_map(|(m, e)| format!("({:?})", m * 10f64.powi(e))),
+    ];
+    leaf.prop_recursive(4, 24, 3, |part| {
+        prop_oneof![
+            6 => (part.clone(), prop::sample::select(vec!["+", "-", "*", "/"]), part.clone())
+                .prop_map(|(a, o, b)| format!("({a} {o} {b})")),
+            2 => (part.clone(), prop::sample::select(vec!["2", "3", "0.5", "-1", "1.7", "64"]))
+                .prop_map(|(a, n)| format!("({a})^{n}")),
+            4 => (prop::sample::select(vec!["sqrt", "abs", "sin", "cos", "tan", "exp", "log"]), part.clone())
+                .prop_map(|(f, a)| format!("{f}({a})")),
+            2 => (prop::sample::select(vec!["min", "max"]), part.clone(), part)
+                .prop_map(|(f, a, b)| format!("{f}({a}, {b})")),
+        ]
+    })
+}
+
+fn clip() -> impl Strategy<Value = Clip> {
+    let half = || 0.01..10.0;
+    prop_oneof![
+        radius().prop_map(|radius| Clip::Ball { radius }),
+        ([half(), half(), half()], -1.0..1.0).prop_map(|(half, shift)| {
+            let half = DVec3::from_array(half);
+            Clip::Box {
+                min: half * (shift - 1.0),
+                max: half * (shift + 1.0),
+            }
+        }),
+    ]
+}
+
+/// Well-known surfaces, and formulas that nobody would write.
+fn implicit() -> impl Strategy<Value = Shape> {
+    let known = prop::sample::select(vec![
+        "x^2 + y^2 + z^2 - a^2",
+        "(x^2 + y^2 + z^2 + 1 - a^2/16)^2 - 4 (x^2 + y^2)",
+        "abs(sin(a x) cos(a y) + sin(a y) cos(a z) + sin(a z) cos(a x)) - 0.2",
+        "x^4 + y^4 + z^4 - x^2 - y^2 - z^2 + 0.3",
+        "max(abs(x), abs(y), abs(z)) - 0.5",
+        "z - sin(a x) exp(-y^2)",
+    ]);
+    let formula = prop_oneof![known.prop_map(str::to_owned), formula()];
+    let level = prop_oneof![Just(0.0), -1.0..1.0];
+    let place = (point(), radius(), unit(), -180.0..180.0f64);
+    (formula, -3.0..3.0f64, level, place, clip(), any::<bool>()).prop_filter_map(
+        "numbers that stay in range",
+        |(text, a, level, (center, scale, axis, angle), clip, closed)| {
+            let mut shape = Implicit::new(&text, &[("a", a)]).ok()?;
+            shape.level = level;
+            shape.center = center;
+            shape.scale = scale;
+            shape.rotation = DMat3::from_axis_angle(axis, angle.to_radians());
+            shape.clip = clip;
+            shape.closed = closed;
+            Some(Shape::Implicit(Arc::new(shape)))
+        },
+    )
+}
+
 fn light() -> impl Strategy<Value = Light> {
     (point(), unit(), radius(), share(), 0.0..1e15).prop_map(
         |(center, normal, radius, color, power)| Light {
@@ -93,10 +158,37 @@ fn camera() -> impl Strategy<Value = Camera> {
         })
 }
 
-/// Valid scenes; the names of materials are such that TOML must quote some.
-pub fn scenes() -> impl Strategy<Value = Scene> {
+/// Valid scenes, with one to three formulas if asked; the names of materials are such that TOML must quote some.
+pub fn scenes(formulas: bool) -> BoxedStrategy<Scene> {
+    if !formulas {
+        return scenes_of(shape()).boxed();
+    }
+    let shapes = prop_oneof![2 => shape(), 1 => implicit()];
+    let with_one_more = (scenes_of(shapes), implicit()).prop_map(|(mut scene, shape)| {
+        let mut count = 0;
+        scene.primitives.retain(|p| {
+            let is_formula = matches!(p.shape, Shape::Implicit(_));
+            count += usize::from(is_formula);
+            count < 3 || !is_formula
+        });
+        let glass = |m: usize| matches!(scene.materials[m].bsdf, Bsdf::Dielectric { .. });
+        let solid = matches!(&shape, Shape::Implicit(s) if s.closed);
+        if let Some(material) = (0..scene.materials.len()).find(|&m| solid || !glass(m)) {
+            scene.primitives.push(Primitive {
+                shape,
+                material,
+                line: 0,
+                column: 0,
+            });
+        }
+        scene
+    });
+    with_one_more.boxed()
+}
+
+fn scenes_of(shape: impl Strategy<Value = Shape>) -> impl Strategy<Value = Scene> {
     let materials = vec(("[a-z .\"\\\\é-]{0,4}", bsdf()), 1..5);
-    let primitives = vec((shape(), any::<prop::sample::Index>()), 1..12);
+    let primitives = vec((shape, any::<prop::sample::Index>()), 1..12);
     let hint = || prop::option::of(1..1000u32);
     let rest = (prop::option::of(".*"), hint(), hint(), hint());
     (camera(), materials, primitives, vec(light(), 1..4), rest).prop_map(
@@ -114,7 +206,8 @@ pub fn scenes() -> impl Strategy<Value = Scene> {
             let primitives = primitives.into_iter().filter_map(|(shape, index)| {
                 let material = index.index(materials.len());
                 let is_glass = matches!(materials[material].bsdf, Bsdf::Dielectric { .. });
-                let refused = is_glass && matches!(shape, Shape::Disk { .. });
+                let open = matches!(&shape, Shape::Implicit(s) if !s.closed);
+                let refused = is_glass && (open || matches!(shape, Shape::Disk { .. }));
                 (!refused).then_some(Primitive {
                     shape,
                     material,
@@ -135,7 +228,7 @@ pub fn scenes() -> impl Strategy<Value = Scene> {
                 });
             }
             primitives.sort_by_key(|p| {
-                ["sphere", "plane", "disk", "cylinder"]
+                ["sphere", "plane", "disk", "cylinder", "implicit"]
                     .iter()
                     .position(|&kind| kind == p.shape.kind())
             });
