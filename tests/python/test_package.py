@@ -152,7 +152,9 @@ def test_progress_is_shown_if_asked_for(room, capfd):
 
 
 SLEEPER = """
-import etendue, sys
+import etendue, signal, sys
+# A shell without job control starts what runs beside it with SIGINT ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 try:
     etendue.render(sys.argv[1], time=60, backend="cpu", film=sys.argv[2], progress=False)
 except KeyboardInterrupt:
