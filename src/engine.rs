@@ -2,7 +2,7 @@
 
 use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::splats::SplatSetup;
+use crate::film::splats::{Passes, Splat, SplatSetup};
 use std::ops::{AddAssign, Range};
 use std::sync::atomic::AtomicBool;
 
@@ -53,8 +53,8 @@ pub trait Engine {
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError>;
 
-    /// [`render_parts`](Self::render_parts) with a single part, of all pixels of `rect`, after the same numbers of passes of light paths,
-    /// if the engine has any.
+    /// [`render_parts`](Self::render_parts) with a single part, of all pixels of `rect`, and the same numbers of passes of light paths, if
+    /// the engine has any.
     fn render(
         &mut self,
         film: &mut Film,
@@ -63,15 +63,22 @@ pub trait Engine {
         stop: &AtomicBool,
     ) -> Result<Counters, EngineError> {
         let mut counters = Counters::default();
-        if let Some(setup) = self.light_paths() {
-            if film.splats().is_none() {
-                film.begin_splats(setup);
-            }
-            for (passes, rects) in film.lacking_passes(&[rect], samples.clone()) {
-                counters += self.trace_light(film, &rects, passes, stop)?;
-            }
+        if let Some(setup) = self.light_paths()
+            && film.splats().is_none()
+        {
+            film.begin_splats(setup);
+        }
+        let mut traced = Vec::new();
+        for (passes, rects) in film.lacking_passes(&[rect], samples.clone()) {
+            let (splats, more) = self.trace_light(passes.clone(), stop)?;
+            counters += more;
+            let width = film.size[0];
+            traced.push((Passes::new(passes, width, &splats), rects));
         }
         counters += self.render_parts(film, rect, &[Part { rect, samples }], stop)?;
+        for (passes, rects) in traced {
+            rects.into_iter().for_each(|r| film.put_passes(r, &passes));
+        }
         Ok(counters)
     }
 
@@ -80,18 +87,15 @@ pub trait Engine {
         None
     }
 
-    /// Adds `passes` of light paths to the pixels of `rects`, which have none of them, of a film that has
-    /// [room for splats](Film::begin_splats). The work does not depend on how many pixels there are. When `stop` becomes true, the call may
-    /// return [`EngineError::Stopped`]. After an error the film is unchanged.
+    /// Traces `passes` of light paths, and gives all their splats, for [`Film::put_passes`]. Every pass brings light to the whole picture,
+    /// so the work does not depend on which pixels are wanted. When `stop` becomes true, the call may return [`EngineError::Stopped`].
     fn trace_light(
         &mut self,
-        film: &mut Film,
-        rects: &[Rect],
         passes: Range<u64>,
         stop: &AtomicBool,
-    ) -> Result<Counters, EngineError> {
-        let _ = (film, rects, passes, stop);
-        Ok(Counters::default())
+    ) -> Result<(Vec<Splat>, Counters), EngineError> {
+        let _ = (passes, stop);
+        Ok((Vec::new(), Counters::default()))
     }
 
     /// Changes the seed of later samples.

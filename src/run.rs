@@ -8,6 +8,7 @@
 use crate::engine::{Counters, Engine, EngineError, MAX_TILE_PIXELS, Part};
 use crate::film::coverage::{Coverage, Rect};
 use crate::film::error::RelativeError;
+use crate::film::splats::{Passes, Splat};
 use crate::film::{BLOCK, Film, REPLICATES};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,6 +29,12 @@ const MIN_CHECKED_SAMPLES: u64 = 16;
 /// Samples in the first pass over all tiles. A short pass soon gives every pixel samples, so that a `--watch` picture has no
 /// holes. An even shorter one would leave lanes of a software adapter idle.
 const FIRST_PASS: u64 = 64;
+
+/// Bytes of splats that may wait for the samples that they go with, in a picture of so many pixels: passes through the tiles are shorter
+/// where there would be more. A quarter of the film, and more in small pictures.
+pub(crate) fn waiting_bytes(pixels: u64) -> u64 {
+    (16 << 20).max(84 * pixels)
+}
 
 /// The work of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -156,6 +163,8 @@ pub struct Run<'a> {
     pace: Option<f64>,
     /// Seconds of a pass of light paths, measured in the last call; 0 without them.
     light_pace: f64,
+    /// Splats of a pass, counted in the last pass through the tiles.
+    splats_of_a_pass: u64,
     /// Pixels of the largest tile.
     widest: u64,
     /// Pixels of all tiles.
@@ -201,6 +210,7 @@ impl<'a> Run<'a> {
             },
             pace: None,
             light_pace: 0.0,
+            splats_of_a_pass: 0,
             widest: job.tiles.iter().map(Rect::area).max().unwrap_or(0),
             pixels,
             samples_before: samples,
@@ -229,11 +239,22 @@ impl<'a> Run<'a> {
             if at >= job.samples.end {
                 return Ok(StopReason::Samples);
             }
-            let end = self.pass_end(at);
+            let end = self.even_end(at, self.pass_end(at));
             let learning = self.pace.is_none();
-            // Light comes first: no pixel may have more samples than passes.
-            if !self.trace_light(at..end, &mut after)? {
-                return Ok(StopReason::Interrupted);
+            // Pixels get their passes with their samples, so that a run that stops anywhere leaves a film of certain samples.
+            let mut passes: Vec<Passes> = Vec::new();
+            if !self.film.lacking_passes(&job.tiles, at..end).is_empty() {
+                let mut count = 0;
+                let keep = |film: &mut Film, numbers, mut splats: Vec<Splat>| {
+                    let width = film.size[0];
+                    splats.retain(|s| s.is_within(film.bounds, width));
+                    count += splats.len() as u64;
+                    passes.push(Passes::new(numbers, width, &splats));
+                };
+                if !self.trace_light(at..end, &mut after, keep)? {
+                    return Ok(StopReason::Interrupted);
+                }
+                self.splats_of_a_pass = count / (end - at);
             }
             for tile in &job.tiles {
                 for (rect, ranges) in self.film.coverage.missing(*tile, at..end) {
@@ -248,6 +269,9 @@ impl<'a> Run<'a> {
                         if !self.call(rect, &part)? {
                             return Ok(StopReason::Interrupted);
                         }
+                        passes
+                            .iter()
+                            .for_each(|p| self.film.put_lacking_passes(rect, p));
                         self.tally.forecast = self.forecast();
                         after(self.film, &self.tally)?;
                         // The first call measures the speed; all later ones then have the right length.
@@ -260,39 +284,40 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Traces the light paths of `passes` that the job's pixels lack, in calls of the right length. Returns false if it was stopped.
+    /// Traces the light paths of `passes` in calls of the right length, and gives the splats of each to `put`. Returns false if it was
+    /// stopped.
     fn trace_light<E: From<EngineError>>(
         &mut self,
         passes: Range<u64>,
         after: &mut impl FnMut(&Film, &Tally) -> Result<(), E>,
+        mut put: impl FnMut(&mut Film, Range<u64>, Vec<Splat>),
     ) -> Result<bool, E> {
-        for (lacking, rects) in self.film.lacking_passes(&self.job.tiles, passes) {
-            let mut at = lacking.start;
-            while at < lacking.end {
-                if self.stop.load(Ordering::Relaxed) {
-                    return Ok(false);
+        let mut at = passes.start;
+        while at < passes.end {
+            if self.stop.load(Ordering::Relaxed) {
+                return Ok(false);
+            }
+            let fits = match self.light_pace {
+                0.0 => 1,
+                pace => (self.job.call.as_secs_f64() / pace) as u64,
+            };
+            let end = passes.end.min(at + fits.max(1));
+            let begun = Instant::now();
+            let result = self.engine.trace_light(at..end, self.stop);
+            let seconds = begun.elapsed().as_secs_f64();
+            self.tally.seconds += seconds;
+            match result {
+                Ok((splats, counters)) => {
+                    self.tally.counters += counters;
+                    put(self.film, at..end, splats);
                 }
-                let fits = match self.light_pace {
-                    0.0 => 1,
-                    pace => (self.job.call.as_secs_f64() / pace) as u64,
-                };
-                let end = lacking.end.min(at + fits.max(1));
-                let begun = Instant::now();
-                let result = self
-                    .engine
-                    .trace_light(self.film, &rects, at..end, self.stop);
-                let seconds = begun.elapsed().as_secs_f64();
-                self.tally.seconds += seconds;
-                match result {
-                    Ok(counters) => self.tally.counters += counters,
-                    Err(EngineError::Stopped) => return Ok(false),
-                    Err(e) => return Err(e.into()),
-                }
-                self.light_pace = seconds / (end - at) as f64;
-                at = end;
-                if !self.film.coverage.is_empty() {
-                    after(self.film, &self.tally)?;
-                }
+                Err(EngineError::Stopped) => return Ok(false),
+                Err(e) => return Err(e.into()),
+            }
+            self.light_pace = seconds / (end - at) as f64;
+            at = end;
+            if !self.film.coverage.is_empty() {
+                after(self.film, &self.tally)?;
             }
         }
         Ok(true)
@@ -345,6 +370,9 @@ impl<'a> Run<'a> {
         let mut length = 1;
         if let Some(pace) = self.pace {
             length = (self.job.call.as_secs_f64() / (pace * self.widest as f64)) as u64;
+            let waiting = waiting_bytes(self.film.bounds.area());
+            length =
+                length.min(waiting / (self.splats_of_a_pass.max(1) * size_of::<Splat>() as u64));
             if let Some(time) = self.job.time {
                 // All tiles must have the same count when the time is used up.
                 let left = (time.as_secs_f64() - self.tally.seconds).max(0.0);
@@ -356,6 +384,20 @@ impl<'a> Run<'a> {
             .min(block_end)
             .min(self.job.samples.start + stop)
             .min(self.job.samples.end)
+    }
+
+    /// Where a pass must end so that every pixel has all of its samples, and of its light paths, or none. Films whose parts were rendered
+    /// apart need shorter passes.
+    fn even_end(&self, at: u64, end: u64) -> u64 {
+        let film = &self.film;
+        let samples = (self.job.tiles.iter()).flat_map(|t| film.coverage.missing(*t, at..end));
+        let samples = samples.flat_map(|(_, ranges)| ranges);
+        let passes = film.lacking_passes(&self.job.tiles, at..end);
+        let ends = samples.chain(passes.into_iter().map(|(range, _)| range));
+        let ends = ends.flat_map(|r| [r.start, r.end]);
+        ends.filter(|k| (at + 1..end).contains(k))
+            .min()
+            .unwrap_or(end)
     }
 
     /// Whether the time is used up, or would be before half of this call is done. The first sample of

@@ -1,5 +1,6 @@
 //! The render settings: flags override the scene file, which overrides the defaults.
 
+use crate::film::splats;
 use crate::scene::{DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Primitive, Scene};
 use serde::{Deserialize, Serialize};
 
@@ -202,10 +203,16 @@ impl Settings {
         self.integrator == Integrator::Path && self.light.indirect && self.max_depth > 2
     }
 
+    /// Whether light paths are traced where a scene has a use for them.
+    pub(crate) fn allows_light_paths(&self) -> bool {
+        let pixels = self.size.map(u64::from).iter().product::<u64>();
+        self.light_paths && self.finds_light_by_chance() && pixels <= splats::MAX_PIXELS
+    }
+
     /// Whether light paths may be traced in a picture of `scene`: something must be specular.
     pub(crate) fn may_trace_light(&self, scene: &Scene) -> bool {
         let specular = |p: &Primitive| scene.materials[p.material].bsdf.kind().is_specular();
-        self.light_paths && self.finds_light_by_chance() && scene.primitives.iter().any(specular)
+        self.allows_light_paths() && scene.primitives.iter().any(specular)
     }
 
     /// Whether light can arrive that has been scattered by a surface.

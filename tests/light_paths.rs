@@ -9,6 +9,7 @@ use common::{block_means, cpu, film, scene, settings, worst_t};
 use etendue::engine::Engine;
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
+use etendue::film::splats::Passes;
 use etendue::gpu::{Choice, Gpu, GpuEngine};
 use etendue::kernel::{Access, Kernel, compose};
 use etendue::reference::Estimator;
@@ -415,8 +416,9 @@ fn the_same_bits_however_the_passes_are_cut() {
         let mut film = Film::new(SIZE, whole, settings.strata);
         film.begin_splats(setup);
         for &(rect, from, to) in cuts {
-            let traced = engine.trace_light(&mut film, &[rect], from..to, &stop);
-            assert!(traced.expect("passes").light_paths > 0);
+            let (splats, counters) = engine.trace_light(from..to, &stop).expect("passes");
+            assert!(counters.light_paths > 0);
+            film.put_passes(rect, &Passes::new(from..to, SIZE[0], &splats));
         }
         film
     };

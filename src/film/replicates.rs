@@ -85,7 +85,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::super::coverage::Rect;
-    use super::super::splats::{Splat, SplatSetup};
+    use super::super::splats::{Passes, Splat, SplatSetup};
     use super::*;
 
     const SIZE: [u32; 2] = [3, 2];
@@ -109,15 +109,11 @@ mod tests {
         });
         let whole = Rect::whole(SIZE);
         let splats: Vec<Splat> = (0..4)
-            .map(|replicate| Splat {
-                pixel: [2, 1],
-                replicate,
-                value: [0.5 * replicate as f32; 3],
-            })
+            .map(|r| Splat::new([2, 1], SIZE[0], r, [0.5 * r as f32; 3]))
             .collect();
-        film.put_passes(&[whole], 0..3, &splats[..3]);
+        film.put_passes(whole, &Passes::new(0..3, SIZE[0], &splats[..3]));
         assert_eq!(film.replicates_apart(), Err(NoReplicates::NoPasses));
-        film.put_passes(&[whole], 3..4, &splats[3..]);
+        film.put_passes(whole, &Passes::new(3..4, SIZE[0], &splats[3..]));
         let apart = film.replicates_apart().unwrap();
         let of = |r: usize, i: usize| apart.means[r][i][1];
         for r in 0..REPLICATES {

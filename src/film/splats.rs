@@ -25,15 +25,100 @@ pub struct SplatSetup {
     pub scale: f64,
 }
 
+/// The most pixels of a picture with light paths: a splat has the number of its pixel in this many bits.
+pub const MAX_PIXELS: u64 = 1 << PIXEL_BITS;
+
+const PIXEL_BITS: u32 = 30;
+
 /// Light on its way to a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Splat {
-    /// The pixel of the picture.
-    pub pixel: [u32; 2],
-    /// The replicate of its pass.
-    pub replicate: usize,
+    /// The number of the pixel, row by row, and above it the replicate of the pass.
+    place: u32,
     /// What it adds to the sum of the pass: linear RGB, not negative.
     pub value: [f32; 3],
+}
+
+impl Splat {
+    /// Adds `value` to a replicate of a pixel of a picture that is so wide.
+    pub fn new([x, y]: [u32; 2], width: u32, replicate: usize, value: [f32; 3]) -> Self {
+        let place = y * width + x | (replicate as u32) << PIXEL_BITS;
+        Self { place, value }
+    }
+
+    /// As the kernel writes it.
+    pub(crate) fn from_words([place, r, g, b]: [u32; 4]) -> Self {
+        Self {
+            place,
+            value: [r, g, b].map(f32::from_bits),
+        }
+    }
+
+    /// The pixel of a picture that is so wide.
+    fn pixel(&self, width: u32) -> [u32; 2] {
+        let number = self.place & ((1 << PIXEL_BITS) - 1);
+        [number % width, number / width]
+    }
+
+    /// Whether it falls into `rect` of a picture that is so wide.
+    pub(crate) fn is_within(&self, rect: Rect, width: u32) -> bool {
+        let [x, y] = self.pixel(width);
+        rect.contains(x, y)
+    }
+
+    fn replicate(&self) -> usize {
+        (self.place >> PIXEL_BITS) as usize
+    }
+}
+
+/// All splats of some passes, on their way to a film.
+#[derive(Debug, Clone)]
+pub struct Passes {
+    numbers: Range<u64>,
+    /// Pixels in a row of the picture.
+    width: u32,
+    /// Row by row.
+    splats: Vec<Splat>,
+    /// Where each row of the picture begins in `splats`, and the end of the last one that has any.
+    rows: Vec<usize>,
+}
+
+impl Passes {
+    /// The passes of these numbers have these splats on a picture that is so wide, in any order.
+    pub fn new(numbers: Range<u64>, width: u32, splats: &[Splat]) -> Self {
+        let row = |s: &Splat| s.pixel(width)[1] as usize;
+        let mut rows = vec![0; splats.iter().map(row).max().map_or(1, |last| last + 2)];
+        splats.iter().for_each(|s| rows[row(s) + 1] += 1);
+        for y in 1..rows.len() {
+            rows[y] += rows[y - 1];
+        }
+        let mut next = rows.clone();
+        let mut sorted = splats.to_vec();
+        for splat in splats {
+            let at = &mut next[row(splat)];
+            sorted[*at] = *splat;
+            *at += 1;
+        }
+        Self {
+            numbers,
+            width,
+            splats: sorted,
+            rows,
+        }
+    }
+
+    /// Their numbers.
+    pub fn numbers(&self) -> Range<u64> {
+        self.numbers.clone()
+    }
+
+    /// Splats on pixels of `rect`.
+    fn within(&self, rect: Rect) -> impl Iterator<Item = &Splat> {
+        let start = |y: u32| self.rows[(y as usize).min(self.rows.len() - 1)];
+        let rows = &self.splats[start(rect.y0)..start(rect.y1)];
+        rows.iter()
+            .filter(move |s| (rect.x0..rect.x1).contains(&s.pixel(self.width)[0]))
+    }
 }
 
 /// The splats of a film.
@@ -168,33 +253,37 @@ impl Film {
         self.splats = Some(splats);
     }
 
-    /// Adds passes to the pixels of disjoint `rects`, with all their splats there. Splats elsewhere are left out.
+    /// Adds passes to the pixels of `rect`, which have none of them, with all their splats there.
     ///
     /// # Panics
     /// If the film has no room for splats.
-    pub fn put_passes(&mut self, rects: &[Rect], passes: Range<u64>, splats: &[Splat]) {
+    pub fn put_passes(&mut self, rect: Rect, passes: &Passes) {
         let (bounds, strata) = (self.bounds, self.strata);
         let own = self.splats.as_mut().expect("a film with light paths");
         let scale = 1.0 / own.setup.scale;
-        for splat in splats {
-            let [x, y] = splat.pixel;
-            if !rects.iter().any(|r| r.contains(x, y)) {
-                continue;
-            }
+        for splat in passes.within(rect) {
+            let [x, y] = splat.pixel(passes.width);
             let i = (y - bounds.y0) as usize * bounds.width() as usize + (x - bounds.x0) as usize;
             let value = splat.value.map(|v| f64::from(v) * scale);
             let lightness = luminance(value);
             let added = [value[0], value[1], value[2], lightness * lightness];
-            let dither = hash(splat);
-            let sums = &mut own.sums[i][splat.replicate];
+            let dither = hash([x, y], splat.value);
+            let sums = &mut own.sums[i][splat.replicate()];
             for (sum, v) in sums.iter_mut().zip(added) {
                 // A float to an integer saturates.
                 *sum = sum.saturating_add((v * STEPS + dither) as u64);
             }
         }
-        for rect in rects {
-            own.count(bounds, *rect, std::slice::from_ref(&passes), strata);
-            own.coverage.add(*rect, passes.clone());
+        own.count(bounds, rect, std::slice::from_ref(&passes.numbers), strata);
+        own.coverage.add(rect, passes.numbers());
+    }
+
+    /// The same for those pixels of `rect` that lack all of these passes; others have all of them.
+    pub fn put_lacking_passes(&mut self, rect: Rect, passes: &Passes) {
+        for (_, parts) in self.lacking_passes(&[rect], passes.numbers()) {
+            parts
+                .into_iter()
+                .for_each(|part| self.put_passes(part, passes));
         }
     }
 
@@ -240,9 +329,9 @@ impl Film {
 }
 
 /// A number in [0, 1) made of a splat's bits.
-fn hash(splat: &Splat) -> f64 {
-    let [r, g, b] = splat.value.map(|v| u64::from(v.to_bits()));
-    let [x, y] = splat.pixel.map(u64::from);
+fn hash(pixel: [u32; 2], value: [f32; 3]) -> f64 {
+    let [r, g, b] = value.map(|v| u64::from(v.to_bits()));
+    let [x, y] = pixel.map(u64::from);
     let mut h = (r ^ g << 32) ^ (b ^ x << 32).rotate_left(17) ^ (y << 3).rotate_left(41);
     // The finalizer of SplitMix64 [Steele2014].
     h = (h ^ h >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -271,11 +360,7 @@ mod tests {
     const SIZE: [u32; 2] = [3, 2];
 
     fn splat(x: u32, replicate: usize, value: [f32; 3]) -> Splat {
-        Splat {
-            pixel: [x, 0],
-            replicate,
-            value,
-        }
+        Splat::new([x, 0], SIZE[0], replicate, value)
     }
 
     fn film() -> Film {
@@ -292,12 +377,12 @@ mod tests {
         let faint = |k: u32| splat(1, 0, [1e-12 * (1.0 + k as f32 * 1e-4), 3.0, 7.5]);
         let mut all: Vec<Splat> = (0..4000).map(faint).collect();
         let [mut one, mut other] = [film(), film()];
-        one.put_passes(&[Rect::whole(SIZE)], 0..4, &all);
+        one.put_passes(Rect::whole(SIZE), &Passes::new(0..4, SIZE[0], &all));
         all.reverse();
         let (a, b) = all.split_at(1234);
-        let whole = [Rect::whole(SIZE)];
-        other.put_passes(&whole, 0..2, a);
-        other.put_passes(&whole, 2..4, b);
+        let whole = Rect::whole(SIZE);
+        other.put_passes(whole, &Passes::new(0..2, SIZE[0], a));
+        other.put_passes(whole, &Passes::new(2..4, SIZE[0], b));
         assert_eq!(one, other);
         let light = one.all_light(1, 0, &[1; REPLICATES]);
         let expected: f64 = all.iter().map(|s| f64::from(s.value[0])).sum();
@@ -312,7 +397,7 @@ mod tests {
         let whole = Rect::whole(SIZE);
         film.put_samples(whole, 0..8, vec![[[2.0, 2.0, 2.0, 2.0]; REPLICATES]; 6]);
         let passes: Vec<Splat> = (0..4).map(|r| splat(2, r, [r as f32 + 1.0; 3])).collect();
-        film.put_passes(&[whole], 0..4, &passes);
+        film.put_passes(whole, &Passes::new(0..4, SIZE[0], &passes));
         let counts = [2; REPLICATES];
         assert_eq!(film.estimate(0, 0, &counts).mean, [1.0; 3]);
         let lit = film.estimate(2, 0, &counts);
@@ -329,11 +414,8 @@ mod tests {
             x1: 1,
             ..Rect::whole(SIZE)
         };
-        film.put_passes(
-            &[left],
-            0..1,
-            &[splat(0, 0, [1.0; 3]), splat(2, 0, [1.0; 3])],
-        );
+        let all = [splat(2, 0, [1.0; 3]), splat(0, 0, [1.0; 3])];
+        film.put_passes(left, &Passes::new(0..1, SIZE[0], &all));
         assert!(film.splats().expect("splats").sums()[2][0][0] == 0);
         assert!(film.splats().expect("splats").sums()[0][0][0] > 0);
     }

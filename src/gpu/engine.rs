@@ -10,7 +10,7 @@ use super::{Choice, Gpu, GpuError, scene};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::Film;
 use crate::film::coverage::Rect;
-use crate::film::splats::SplatSetup;
+use crate::film::splats::{Splat, SplatSetup};
 use crate::kernel::layout::Params;
 use crate::kernel::{Access, Kernel, compose, trips};
 use crate::settings::Settings;
@@ -195,7 +195,7 @@ impl GpuEngine {
             .map(|(layout, light)| light_paths::bind_aims(&gpu, &layout, world, light));
         // SAFETY: it belongs to the path kernel.
         let light = (kernel.light.as_ref())
-            .map(|k| unsafe { LightTracer::new(&gpu, world, k, &scene_layout, settings.size[0]) });
+            .map(|k| unsafe { LightTracer::new(&gpu, world, k, &scene_layout) });
         let light = light.transpose().map_err(unable)?;
         let params = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("params"),
@@ -538,21 +538,16 @@ impl Engine for GpuEngine {
 
     fn trace_light(
         &mut self,
-        film: &mut Film,
-        rects: &[Rect],
         passes: Range<u64>,
         stop: &AtomicBool,
-    ) -> Result<Counters, EngineError> {
+    ) -> Result<(Vec<Splat>, Counters), EngineError> {
         let Some(light) = &mut self.light else {
-            return Ok(Counters::default());
+            return Ok((Vec::new(), Counters::default()));
         };
         let mut splats = Vec::new();
         let (gpu, scene, seed) = (&self.gpu, &self.scene, self.seed);
-        let counters = light.trace(gpu, scene, seed, passes.clone(), stop, |s| {
-            splats.push(s);
-        })?;
-        film.put_passes(rects, passes, &splats);
-        Ok(counters)
+        let counters = light.trace(gpu, scene, seed, passes, stop, |s| splats.push(s))?;
+        Ok((splats, counters))
     }
 
     fn reseed(&mut self, seed: u32) {

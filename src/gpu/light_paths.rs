@@ -27,9 +27,6 @@ const WORKGROUP: u32 = 64;
 /// Bytes of a splat, and of what an invocation says of its progress.
 const RECORD: u64 = 16;
 
-/// In a record, the replicate stands above the pixel.
-const REPLICATE_SHIFT: u32 = 30;
-
 /// What the device holds for light paths.
 pub(super) struct LightTracer {
     pipeline: wgpu::ComputePipeline,
@@ -39,7 +36,6 @@ pub(super) struct LightTracer {
     params: wgpu::Buffer,
     buffers: Buffers,
     setup: SplatSetup,
-    width: u32,
     each: u32,
     /// Light paths that a submission aims at.
     batch: f64,
@@ -86,7 +82,6 @@ impl LightTracer {
         world: &World,
         kernel: &LightKernel,
         scene: &wgpu::BindGroupLayout,
-        width: u32,
     ) -> Result<Self, String> {
         if kernel.trips_per_path > gpu.trip_limit {
             let what = "one light path of this scene may take";
@@ -160,7 +155,6 @@ impl LightTracer {
                 paths: kernel.photons,
                 scale: brightest.log2().ceil().exp2(),
             },
-            width,
             each,
             batch: f64::from(WORKGROUP * each),
         })
@@ -244,15 +238,13 @@ impl LightTracer {
                 full |= was_full > 0;
                 done[k] = now;
                 counters.rays += u64::from(rays);
-                for &[place, values @ ..] in &records[..splats as usize] {
-                    let value = values.map(f32::from_bits);
-                    if value.iter().all(|v| v.is_finite()) {
-                        let pixel = place & ((1 << REPLICATE_SHIFT) - 1);
-                        take(Splat {
-                            pixel: [pixel % self.width, pixel / self.width],
-                            replicate: (place >> REPLICATE_SHIFT) as usize,
-                            value,
-                        });
+                for splat in records[..splats as usize]
+                    .iter()
+                    .copied()
+                    .map(Splat::from_words)
+                {
+                    if splat.value.iter().all(|v| v.is_finite()) {
+                        take(splat);
                     } else {
                         counters.nonfinite += 1;
                     }

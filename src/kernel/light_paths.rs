@@ -30,7 +30,7 @@ pub(super) fn photons(size: [u32; 2]) -> u32 {
 
 /// The pairs of lights and specular surfaces, if the picture has light paths. The shortest has two vertices, and the light is a third.
 pub(super) fn aims(world: &World, settings: &Settings) -> Option<Aims> {
-    let wanted = settings.light_paths && settings.finds_light_by_chance();
+    let wanted = settings.allows_light_paths();
     let mut used = (world.primitives.iter()).map(|p| world.materials[p.material].kind());
     let scatters = used.any(|kind| !kind.is_specular());
     if wanted && scatters && last_depth(settings) > 2 {

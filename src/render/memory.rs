@@ -2,6 +2,7 @@
 
 use super::Error;
 use crate::engine::MAX_TILE_PIXELS;
+use crate::run::waiting_bytes;
 use std::fs;
 
 /// Bytes per pixel of the film: four replicates, each of four f64 sums and four f32 sums of the unfinished block.
@@ -50,6 +51,11 @@ impl Need {
     /// Bytes.
     fn bytes(self) -> u64 {
         let splats = if self.light_paths { SPLAT_BYTES } else { 0 };
+        let waiting = if self.light_paths {
+            waiting_bytes(self.pixels)
+        } else {
+            0
+        };
         let film = FILM_BYTES + splats;
         let mut of_pixel = OUTPUT_BYTES;
         if self.film {
@@ -59,7 +65,8 @@ impl Need {
             of_pixel += COPIES * (film + SHOWN_BYTES);
         }
         let tile = self.pixels.min(MAX_TILE_PIXELS) * TILE_BYTES;
-        self.pixels.saturating_mul(of_pixel).saturating_add(tile)
+        let film = self.pixels.saturating_mul(of_pixel);
+        film.saturating_add(tile).saturating_add(waiting)
     }
 }
 

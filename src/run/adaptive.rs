@@ -9,6 +9,7 @@ use super::{Run, StopReason, next_check, paths};
 use crate::engine::{EngineError, Part};
 use crate::film::coverage::Rect;
 use crate::film::pilot::Pilot;
+use crate::film::splats::Passes;
 use crate::film::{BLOCK, Film, REPLICATES};
 use crate::kernel::pilot_seed;
 use std::ops::Range;
@@ -102,8 +103,15 @@ impl Run<'_> {
                 wanted = self.counts(&tiles, next);
             }
             let learning = self.pace.is_none();
-            if !self.trace_light(0..next, &mut after)? {
-                return Ok(StopReason::Interrupted);
+            // How far a tile gets depends on its noise, so all pixels get as many passes as samples on average.
+            for (lacking, rects) in self.film.lacking_passes(&job.tiles, 0..next) {
+                let put = |film: &mut Film, numbers, splats: Vec<_>| {
+                    let passes = Passes::new(numbers, film.size[0], &splats);
+                    rects.iter().for_each(|r| film.put_passes(*r, &passes));
+                };
+                if !self.trace_light(lacking, &mut after, put)? {
+                    return Ok(StopReason::Interrupted);
+                }
             }
             for &tile in &job.tiles {
                 loop {

@@ -3,6 +3,7 @@
 use super::*;
 use crate::engine::DeviceInfo;
 use crate::film::Sums;
+use crate::film::splats::SplatSetup;
 
 /// An engine whose pixels are noise that depends on pixel and sample number alone; notes its calls.
 struct Fake {
@@ -15,6 +16,8 @@ struct Fake {
     seed: u32,
     /// Whether it ignores `reseed` and keeps its seed.
     deaf: bool,
+    /// Whether it traces light paths.
+    light: bool,
     value: fn(u64) -> f64,
 }
 
@@ -33,6 +36,7 @@ impl Fake {
             fail_at: None,
             seed: 0,
             deaf: false,
+            light: false,
             value: |h| (h >> 40) as f64 / (1u64 << 24) as f64,
         }
     }
@@ -108,6 +112,35 @@ impl Engine for Fake {
             paths: parts.iter().map(Part::paths).sum(),
             ..Counters::default()
         })
+    }
+
+    fn light_paths(&self) -> Option<SplatSetup> {
+        self.light.then_some(SplatSetup {
+            paths: 64,
+            scale: 1.0,
+        })
+    }
+
+    fn trace_light(
+        &mut self,
+        passes: Range<u64>,
+        stop: &AtomicBool,
+    ) -> Result<(Vec<Splat>, Counters), EngineError> {
+        if stop.load(Ordering::Relaxed) {
+            return Err(EngineError::Stopped);
+        }
+        // Wider than the films of these tests.
+        let splat = |pass: u64, k: u32| {
+            let value = noise(self.seed, k, 0, pass) as f32 * (-64f32).exp2();
+            Splat::new(
+                [k % 7, k % 5],
+                7,
+                (pass / 4) as usize % REPLICATES,
+                [value; 3],
+            )
+        };
+        let splats = passes.flat_map(|pass| (0..9).map(move |k| splat(pass, k)));
+        Ok((splats.collect(), Counters::default()))
     }
 
     fn reseed(&mut self, seed: u32) {
@@ -189,6 +222,51 @@ fn passes_cover_the_job_and_stay_in_their_block() {
             .flatten()
             .any(|p| p.samples.end - p.samples.start >= 64)
     );
+}
+
+/// However a run ends, each pixel has the passes of its samples and no others: what a film holds says all of what it is.
+#[test]
+fn a_run_that_stops_anywhere_leaves_the_light_paths_of_its_samples() {
+    let size = [7, 5];
+    let job = job(size, 14, 0..300);
+    let lit = || Fake {
+        light: true,
+        ..Fake::new()
+    };
+    let new = || Film::new(size, Rect::whole(size), 2);
+    let mut whole = new();
+    assert_eq!(run(&job, &mut lit(), &mut whole), StopReason::Samples);
+    let splats = |film: &Film| film.splats().expect("light paths").clone();
+    assert!(splats(&whole).sums().iter().flatten().any(|s| s[0] > 0));
+    let mut ends = Vec::new();
+    for calls in 1.. {
+        let mut film = new();
+        let (mut left, stop) = (calls, AtomicBool::new(false));
+        let mut engine = lit();
+        let end = Run::new(&job, &mut engine, &mut film, &stop).go(|film, _| {
+            let own = &film.splats().expect("light paths").coverage;
+            for (rect, ranges) in film.coverage.cells() {
+                for samples in ranges {
+                    assert!(own.missing(rect, samples.clone()).is_empty());
+                }
+            }
+            assert_eq!(own.total(), film.coverage.total());
+            left -= 1;
+            stop.store(left == 0, Ordering::Relaxed);
+            Ok::<(), EngineError>(())
+        });
+        let end = end.unwrap();
+        ends.push(film.coverage.samples().0);
+        assert_eq!(run(&job, &mut lit(), &mut film), StopReason::Samples);
+        assert!(
+            splats(&film).sums() == splats(&whole).sums(),
+            "{calls} calls"
+        );
+        if end == StopReason::Samples {
+            break;
+        }
+    }
+    assert!(ends.iter().any(|n| (1..300).contains(n)), "{ends:?}");
 }
 
 #[test]

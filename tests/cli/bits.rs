@@ -327,6 +327,17 @@ fn light_paths_bring_the_same_however_a_film_is_cut() {
         assert!(splats.sums() == of_one.sums(), "{name}");
         assert_eq!(splats.coverage.total(), of_one.coverage.total(), "{name}");
     }
+    // Time and signals end a film at samples that another run can have too.
+    render("--time 300ms --film timed.npz").success();
+    let timed = bench.film("timed.npz");
+    let (samples, most) = timed.coverage.samples();
+    assert_eq!(samples, most, "tiles of one picture end together");
+    render(&format!("--spp {samples} --film counted.npz")).success();
+    assert!(bench.film("counted.npz").splats() == timed.splats());
+    let rest = format!("--samples {samples}..{} --film rest.npz", samples + 8);
+    render(&rest).success();
+    bench.run("merge more.npz rest.npz timed.npz").success();
+
     // Adaptive runs have as many passes as samples on average, whatever led there.
     render("--adaptive --spp 100 --film once.npz").success();
     render("--adaptive --spp 40 --film twice.npz").success();

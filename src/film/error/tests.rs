@@ -3,7 +3,7 @@
 use super::*;
 use crate::film::Sums;
 use crate::film::coverage::Rect;
-use crate::film::splats::SplatSetup;
+use crate::film::splats::{Passes, SplatSetup};
 
 /// SplitMix64: uniform numbers from 0 to below 1.
 struct Uniform(u64);
@@ -233,7 +233,7 @@ fn light_that_mirrors_show_is_in_doubt_until_it_was_found() {
             paths: 64,
             scale: brightest,
         });
-        film.put_passes(&[Rect::whole(SIZE)], 0..SAMPLES, &[]);
+        film.put_passes(Rect::whole(SIZE), &Passes::new(0..SAMPLES, SIZE[0], &[]));
         for k in 0..SIZE[0] * SIZE[1] {
             let how = if k < found {
                 Reach::Found
