@@ -33,7 +33,7 @@ const FIRST_PASS: u64 = 64;
 /// Bytes of splats that may wait for the samples that they go with, in a picture of so many pixels: passes through the tiles are shorter
 /// where there would be more. A quarter of the film, and more in small pictures.
 pub(crate) fn waiting_bytes(pixels: u64) -> u64 {
-    (16 << 20).max(84 * pixels)
+    (32 << 20).max(84 * pixels)
 }
 
 /// The work of a run.
@@ -370,9 +370,13 @@ impl<'a> Run<'a> {
         let mut length = 1;
         if let Some(pace) = self.pace {
             length = (self.job.call.as_secs_f64() / (pace * self.widest as f64)) as u64;
-            let waiting = waiting_bytes(self.film.bounds.area());
-            length =
-                length.min(waiting / (self.splats_of_a_pass.max(1) * size_of::<Splat>() as u64));
+            let splats = self.splats_of_a_pass.max(1) * size_of::<Splat>() as u64;
+            length = length
+                .min(waiting_bytes(self.film.bounds.area()) / splats)
+                .max(1);
+            // Equal parts of what is left of the block: a short rest would leave lanes idle.
+            let rest = block_end - at;
+            length = rest.div_ceil(((rest + length / 2) / length).max(1));
             if let Some(time) = self.job.time {
                 // All tiles must have the same count when the time is used up.
                 let left = (time.as_secs_f64() - self.tally.seconds).max(0.0);
