@@ -3,7 +3,8 @@
     denoise_mitsuba.py PROGRAM FOLDER [SCENE...]
 
 Needs the packages mitsuba, numpy and pyoidn. Times are user and system seconds of rendering and denoising; what either program needs to
-start and to compile is in neither. References are kept in FOLDER. Prints rows of a table.
+start and to compile is in neither. References are kept in FOLDER. Prints rows of a table; each error is that of the whole picture, and
+that without lamps that are seen directly and their edges.
 """
 
 import pathlib
@@ -34,18 +35,22 @@ def ours(*command):
     return seconds(resource.RUSAGE_CHILDREN) - begun
 
 
+def channel(path, name):
+    picture = mi.Bitmap(str(path))
+    names = [field.name for field in picture.struct_()]
+    return np.array(picture).astype(float)[..., names.index(name)]
+
+
 def luminance(path, layer=""):
     """A layer's luminance."""
-    picture = mi.Bitmap(str(path))
-    names = [field.name for field in picture.struct_()]
-    pixels = np.array(picture).astype(float)
-    return sum(k * pixels[..., names.index(layer + c)] for k, c in zip(LUMINANCE, "RGB"))
+    return sum(k * channel(path, layer + c) for k, c in zip(LUMINANCE, "RGB"))
 
 
-def error_of(path):
-    picture = mi.Bitmap(str(path))
-    names = [field.name for field in picture.struct_()]
-    return np.array(picture).astype(float)[..., names.index("error.Y")]
+def near(mask):
+    """The pixels of a mask, and their neighbours."""
+    wide = np.pad(mask, 1)
+    height, width = mask.shape
+    return np.any([wide[y : y + height, x : x + width] for y in range(3) for x in range(3)], axis=0)
 
 
 class Theirs:
@@ -89,10 +94,12 @@ def main():
         common = [program, "render", scene, "--size", SIZE, "-q"]
         if not reference.exists():
             ours(*common, "--spp", REFERENCE, "--seed", 77, "-o", reference)
-        truth, doubt = luminance(reference), np.mean(error_of(reference) ** 2)
+        truth, doubt = luminance(reference), channel(reference, "error.Y") ** 2
 
         def wrong(picture):
-            return 100 * np.sqrt(max(np.mean((picture - truth) ** 2) - doubt, 0)) / truth.mean()
+            square = (picture - truth) ** 2 - doubt
+            shares = [100 * np.sqrt(max(part.mean(), 0)) / truth.mean() for part in (square, square[~lamps])]
+            return " / ".join(f"{share:.1f}" for share in shares)
 
         def film_of(samples):
             film.unlink(missing_ok=True)
@@ -100,6 +107,10 @@ def main():
 
         film_of(16)  # compiles
         few, many = film_of(16), film_of(272)
+        # Lamps are the last of the materials.
+        ours(program, "develop", film, "-q", "-o", picture, "--layers", "material")
+        material = channel(picture, "material.I")
+        lamps = near(material == material.max())
         for samples in SAMPLES:
             film_of(samples)
             plain = ours(program, "develop", film, "-q", "-o", picture)
@@ -109,7 +120,7 @@ def main():
             spp = max(round((time - once) / theirs.slope), 1)
             noisy, clean, _ = theirs.denoised(spp)
             shown = [luminance(picture), luminance(picture, "denoised."), noisy, clean]
-            row = [name, f"{time:.1f}", samples, *(f"{wrong(p):.1f} %" for p in shown[:2]), spp, *(f"{wrong(p):.1f} %" for p in shown[2:])]
+            row = [name, f"{time:.1f}", samples, *map(wrong, shown[:2]), spp, *map(wrong, shown[2:])]
             print("| " + " | ".join(map(str, row)) + " |", flush=True)
 
 
