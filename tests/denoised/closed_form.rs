@@ -260,3 +260,74 @@ fn the_stated_interval_holds_the_truth_at_256_samples() {
         );
     }
 }
+
+/// A number of [0, 1) for each place, by Steele, Lea and Flood's mixer.
+fn uniform(seed: u64, place: u64) -> f64 {
+    let mut z = ((seed << 32) | place).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Highlights of one pixel each, which a median loses, have most of the error, and other pixels have fireflies.
+#[test]
+fn the_mixture_keeps_highlights_and_no_fireflies_and_its_error_is_right() {
+    const LIGHT: f64 = 10.0;
+    let (scene, mut bright) = (scene(), truth());
+    let highlights: Vec<usize> = (40..bright.len()).step_by(43).collect();
+    for i in &highlights {
+        bright[*i] += LIGHT;
+    }
+    let light = |p: &[f32; 3]| luminance(p.map(f64::from));
+    let wrong = |picture: &Rgb| {
+        let pairs = picture.iter().zip(&bright);
+        mean(
+            &pairs
+                .map(|(p, t)| (light(p) - t).powi(2))
+                .collect::<Vec<_>>(),
+        )
+    };
+    let (mut surplus, mut squares) = (Vec::new(), [0.0; 3]);
+    for seed in 50_000..50_128 {
+        let mut own = replicates(&scene, seed, 16);
+        for (r, replicate) in own.iter_mut().enumerate() {
+            for i in &highlights {
+                // Between nothing and twice as much.
+                let relative = 2.0 * uniform(seed.into(), (4 * i + r) as u64);
+                replicate[*i] = replicate[*i].map(|c| c + (LIGHT * relative) as f32);
+            }
+        }
+        let mean_of = |pictures: &[Rgb]| -> Rgb {
+            let share = 1.0 / pictures.len() as f32;
+            let pixel =
+                |i: usize| [0, 1, 2].map(|c| pictures.iter().map(|p| p[i][c]).sum::<f32>() * share);
+            (0..bright.len()).map(pixel).collect()
+        };
+        let folds: [Rgb; PAIRS.len()] = std::array::from_fn(|pair| median(&half(&own, pair)));
+        let judged = judge(&own, &folds, SIZE[0] as usize, None);
+        let raw = mean_of(&own);
+        let whole = mean(&raw.iter().map(light).collect::<Vec<_>>());
+        let stated = judged.statement.mixture.value().expect("known") * whole;
+        let now = [&judged.mixture, &judged.mean, &raw].map(wrong);
+        surplus.push(stated * stated - now[0]);
+        squares = std::array::from_fn(|k| squares[k] + now[k]);
+
+        // A firefly is in one replicate, and goes.
+        let lit = 300;
+        own[2][lit] = [LIGHT as f32; 3];
+        let folds: [Rgb; PAIRS.len()] = std::array::from_fn(|pair| median(&half(&own, pair)));
+        let judged = judge(&own, &folds, SIZE[0] as usize, None);
+        let left = light(&judged.mixture[lit]) - bright[lit];
+        assert!(left.abs() < 0.1 * LIGHT, "{seed}: {left}");
+    }
+    let [mixture, denoised, raw] = squares;
+    let (m, n) = (mean(&surplus), surplus.len() as f64);
+    let variance = surplus.iter().map(|s| (s - m).powi(2)).sum::<f64>() / (n - 1.0);
+    let z = m / (variance / n).sqrt();
+    let (of_mixture, of_denoised) = (raw / mixture, raw / denoised);
+    println!(
+        "raw / mixture {of_mixture:.3}, raw / denoised {of_denoised:.3}, {z:.2} standard errors"
+    );
+    assert!(of_denoised < 0.5 && of_mixture > 0.95);
+    assert!(z.abs() < MOST, "{z:.2}");
+}
