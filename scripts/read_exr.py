@@ -1,20 +1,25 @@
-"""Compares what OpenImageIO, Blender and three.js read from EXR files with the film: see scripts/other-readers."""
+"""Compares what OpenImageIO, Blender and three.js read from EXR files with what was written: see scripts/other-readers."""
 
+import functools
 import importlib.util
 import json
 import pathlib
 import subprocess
 import sys
+import tomllib
 
 import numpy as np
 
 HALF = 2.0**-11  # relative rounding of a half
-# What our files hold, by the value of --exr: tolerance, and whether there are layers.
-FILES = {"all": (0, True), "rgb": (0, False), "rgb-half": (HALF, False)}
+# What our files hold: tolerance, and whether there are layers.
+FILES = {"all": (0, True), "layers": (0, True), "rgb": (0, False), "rgb-half": (HALF, False)}
+# --layers, with what each channel ends in.
+LAYERS = {"albedo": "RGBA", "normal": "XYZ", "position": "XYZ", "depth": "Z", "id": "I", "material": "I"}
 
 
 def truth(folder, name):
-    """The picture's RGB (h, w, 3), and all its channels by name, from the film."""
+    """The picture's RGB (h, w, 3) from the film, and all its channels by name. Those of --layers are not in a film: OpenEXR itself reads
+    them, and the scene says what they are."""
     with np.load(folder / f"{name}.npz") as film:
         head = json.loads(film["provenance"].item())
         (width, height), part = head["size"], head["bounds"]
@@ -27,7 +32,35 @@ def truth(folder, name):
         mean, error, counts = (whole(film[key]) for key in ["mean", "error", "counts"])
     channels = dict(zip("RGB", np.moveaxis(mean, 2, 0))) | {"A": (counts > 0) * 1.0, "samples": counts}
     channels |= dict(zip(["error.R", "error.G", "error.B", "error.Y"], np.moveaxis(error, 2, 0)))
+    if name == "layers":
+        channels |= written(folder / f"{name}.exr")
     return mean, channels
+
+
+@functools.cache
+def written(path):
+    """The channels of LAYERS, after a look at whether they are the scene's."""
+    import OpenEXR
+
+    file = OpenEXR.File(str(path), separate_channels=True)
+    channels = {f"{layer}.{c}": file.channels()[f"{layer}.{c}"].pixels for layer, all in LAYERS.items() for c in all}
+    names = json.loads(file.header()["material_names"])
+    scene = tomllib.loads(pathlib.Path("scenes/three_materials.toml").read_text())
+    if sorted(names) != sorted(["", "light", *scene["material"]]):
+        sys.exit(f"{path}: the names of its materials are {names}, not the scene's")
+    rows = slice(0, 30)  # what has samples
+    for name, of in scene["material"].items():
+        here = channels["material.I"][rows] == names.index(name)
+        if here.any() and "reflectance" in of:
+            found = np.median(np.stack([channels[f"albedo.{c}"][rows][here] for c in "RGB"]), axis=1)
+            hold(f"{path.name}, albedo of {name}", found, np.array(of["reflectance"]), 1e-6)
+    # Depth is along the view axis.
+    eye, look_at = np.array(scene["camera"]["eye"]), np.array(scene["camera"]["look_at"])
+    axis = (look_at - eye) / np.linalg.norm(look_at - eye)
+    position = np.stack([channels[f"position.{c}"] for c in "XYZ"], axis=-1)
+    seen = channels["albedo.A"] > 0
+    hold(f"{path.name}, depth", channels["depth.Z"][seen], ((position - eye) @ axis)[seen], 1e-5)
+    return channels
 
 
 def hold(what, got, expected, tolerance):
@@ -50,9 +83,11 @@ def openimageio(folder, name):
         sys.exit(f"OpenImageIO: {name}.exr has the channels {names}")
     for i, channel in enumerate(names):
         hold(f"OpenImageIO, {name}.exr, {channel}", pixels[..., i], channels[channel], tolerance)
-    for key in ["seed", "scene_hash", "samples"]:
+    for key in ["seed", "scene_hash", "samples"] + ["material_names"] * (name == "layers"):
         if file.spec().getattribute(key) is None:
             sys.exit(f"OpenImageIO: {name}.exr lacks the attribute {key}")
+    if name == "layers":
+        print("OpenImageIO, layers.exr, material_names:", json.loads(file.spec().getattribute("material_names")))
 
 
 def blender(folder, name):
@@ -82,7 +117,10 @@ def blender(folder, name):
     node.image = image
     end = nodes.new("CompositorNodeComposite")
     shown = {out.name: out for out in node.outputs if out.enabled}
-    for layer, expected in [("Combined", rgb), ("samples", channels["samples"][..., None])]:
+    expected = {"Combined": rgb, "samples": channels["samples"][..., None]}
+    if name == "layers":
+        expected |= {layer: np.stack([channels[f"{layer}.{c}"] for c in all[:3]], axis=-1) for layer, all in LAYERS.items()}
+    for layer, expected in expected.items():
         if layer not in shown:
             sys.exit(f"Blender: {name}.exr has the layers {list(shown)}")
         links.clear()

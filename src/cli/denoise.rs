@@ -131,6 +131,7 @@ impl Made {
                 (folds, "another program".to_owned())
             }
         };
+        progress.step(PAIRS.len(), PAIRS.len(), "the error");
         Ok(Self {
             denoised: task.judge(&folds),
             denoiser,

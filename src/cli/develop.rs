@@ -34,7 +34,7 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     if denoises || !args.pictures.layers.is_empty() {
         let view = view(args, &provenance)?;
         let bounds = film.bounds;
-        layers::add(&mut extra, &args.pictures, &view, bounds, &mut progress);
+        extra = layers::make(&args.pictures, &view, bounds, &mut progress);
         if denoises {
             let task = prepare(&film, &provenance, &view, &mut progress);
             let task = task.map_err(|why| FileError::content(&args.film, why.to_string()))?;

@@ -4,8 +4,8 @@ use super::args::PictureArgs;
 use super::failure::Failure;
 use super::progress::Progress;
 use crate::film::coverage::Rect;
-use crate::layers::{Layer, View, planes};
-use crate::output::{ExrChannels, Extra, Format, Value};
+use crate::layers::{View, beside};
+use crate::output::{ExrChannels, Extra, Format};
 use std::path::PathBuf;
 
 /// Refuses `--layers` where no picture could hold them.
@@ -26,28 +26,10 @@ pub fn check(args: &PictureArgs, outputs: &[PathBuf]) -> Result<(), Failure> {
     Err(Failure::Input(message.into()))
 }
 
-/// Adds the layers that `args` asks for.
-pub fn add(
-    extra: &mut Extra,
-    args: &PictureArgs,
-    view: &View,
-    bounds: Rect,
-    progress: &mut Progress,
-) {
-    let mut layers: Vec<Layer> = args.layers.clone();
-    layers.sort_unstable();
-    layers.dedup();
-    if layers.is_empty() {
-        return;
-    }
+/// The layers that `args` asks for.
+pub fn make(args: &PictureArgs, view: &View, bounds: Rect, progress: &mut Progress) -> Extra {
     let rows = bounds.height() as usize;
-    let made = planes(view, &layers, bounds, |done| {
+    beside(view, &args.layers, bounds, |done| {
         progress.step(done as usize, rows, "layers");
-    });
-    extra.channels.extend(made);
-    if layers.contains(&Layer::Material) {
-        // A list of strings can always be written.
-        let names = serde_json::to_string(view.names()).unwrap_or_default();
-        extra.entries.push(("material_names", Value::Text(names)));
-    }
+    })
 }

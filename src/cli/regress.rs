@@ -168,7 +168,7 @@ pub(super) fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Opt
     let (outcome, pictures) = if args.bless && case.scene {
         case.bless(&engine, &wanted(args), &limits, &signals.stop)?
     } else {
-        case.run(&engine, &limits, &signals.stop)?
+        case.run(&engine, &limits, &args.layers, &signals.stop)?
     };
     Some(Done {
         case: case.clone(),
@@ -222,6 +222,7 @@ pub(super) fn wanted(args: &RegressArgs) -> Wanted {
         power: args.power,
         most_samples: args.max_spp,
         alpha: args.alpha,
+        layers: args.layers.clone(),
     }
 }
 

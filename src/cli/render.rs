@@ -238,7 +238,7 @@ fn render_before(
         if denoiser.is_some() || !args.pictures.layers.is_empty() {
             let view = View::new(&scene, &settings);
             let bounds = film.bounds;
-            layers::add(&mut extra, &args.pictures, &view, bounds, &mut progress);
+            extra = layers::make(&args.pictures, &view, bounds, &mut progress);
             if let Some(by) = &denoiser {
                 let task = prepare(&film, &provenance, &view, &mut progress);
                 let task = task.map_err(|why| Failure::Input(why.to_string()));

@@ -1,7 +1,7 @@
 //! Layers beside two pictures: what is seen in each pixel. They have no noise, so they are held to rounding alone.
 
 use crate::files::FileError;
-use crate::output::read_exr_layers;
+use crate::output::{ExrLayer, read_exr_layers};
 use std::path::Path;
 
 /// Values may differ by this share of the larger one, or of the layer's largest where they are small: rays that graze an edge may round to
@@ -10,9 +10,19 @@ const ROUNDING: f32 = 1e-5;
 
 /// What differs between the layers `names` of two EXR files, in words; nothing if they are the same. A file without one of them is an error.
 pub fn differing(a: &Path, b: &Path, names: &[String]) -> Result<Vec<String>, FileError> {
-    let (a, b) = (read_exr_layers(a, names)?, read_exr_layers(b, names)?);
+    let b = read_exr_layers(b, names)?;
+    differing_from(a, &b, names)
+}
+
+/// The same between the layers `names` of an EXR file, and layers that were just made.
+pub fn differing_from(
+    a: &Path,
+    b: &[ExrLayer],
+    names: &[String],
+) -> Result<Vec<String>, FileError> {
+    let a = read_exr_layers(a, names)?;
     let mut all = Vec::new();
-    for ((name, a), b) in names.iter().zip(&a).zip(&b) {
+    for ((name, a), b) in names.iter().zip(&a).zip(b) {
         let (width, a, b) = (a.width, &a.channels, &b.channels);
         let shape = |channels: &[(String, Vec<f32>)]| -> Vec<(String, usize)> {
             channels.iter().map(|(n, v)| (n.clone(), v.len())).collect()

@@ -42,7 +42,7 @@ pub struct Splat {
 impl Splat {
     /// Adds `value` to a replicate of a pixel of a picture that is so wide.
     pub fn new([x, y]: [u32; 2], width: u32, replicate: usize, value: [f32; 3]) -> Self {
-        let place = y * width + x | (replicate as u32) << PIXEL_BITS;
+        let place = (y * width + x) | ((replicate as u32) << PIXEL_BITS);
         Self { place, value }
     }
 

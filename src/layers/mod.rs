@@ -6,7 +6,7 @@
 pub mod features;
 mod planes;
 
-pub use planes::{Layer, planes};
+pub use planes::{Layer, beside, planes};
 
 use crate::provenance::Provenance;
 use crate::provenance::hash::hash_of;

@@ -2,6 +2,7 @@
 
 use super::{SIDE, View, albedo};
 use crate::film::coverage::Rect;
+use crate::output::{Extra, Value};
 use crate::world::trace::{Finder, Hit, Ray};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -26,6 +27,28 @@ pub enum Layer {
 }
 
 impl Layer {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Albedo,
+        Self::Normal,
+        Self::Position,
+        Self::Depth,
+        Self::Id,
+        Self::Material,
+    ];
+
+    /// What its channels begin with, before a dot.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Albedo => "albedo",
+            Self::Normal => "normal",
+            Self::Position => "position",
+            Self::Depth => "depth",
+            Self::Id => "id",
+            Self::Material => "material",
+        }
+    }
+
     /// The channels, in the order of their values.
     fn channels(self) -> &'static [&'static str] {
         match self {
@@ -144,6 +167,24 @@ pub fn planes(
     names().copied().zip(out).collect()
 }
 
+/// Layers as what a picture holds beside the film's own channels, each once; with the material go the names of materials.
+pub fn beside(view: &View, layers: &[Layer], bounds: Rect, done: impl FnMut(u32)) -> Extra {
+    let mut layers = layers.to_vec();
+    layers.sort_unstable();
+    layers.dedup();
+    let mut extra = Extra::default();
+    if layers.is_empty() {
+        return extra;
+    }
+    extra.channels = planes(view, &layers, bounds, done);
+    if layers.contains(&Layer::Material) {
+        // A list of strings can always be written.
+        let names = serde_json::to_string(view.names()).unwrap_or_default();
+        extra.entries.push(("material_names", Value::Text(names)));
+    }
+    extra
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,15 +210,7 @@ mod tests {
     #[test]
     fn layers_say_what_the_eye_meets() {
         let view = view();
-        let all = [
-            Layer::Albedo,
-            Layer::Normal,
-            Layer::Position,
-            Layer::Depth,
-            Layer::Id,
-            Layer::Material,
-        ];
-        let planes = planes(&view, &all, Rect::whole([40, 40]), |_| ());
+        let planes = planes(&view, &Layer::ALL, Rect::whole([40, 40]), |_| ());
         let at = |x: usize, y: usize| -> BTreeMap<&str, f32> {
             planes.iter().map(|(n, v)| (*n, v[y * 40 + x])).collect()
         };

@@ -4,6 +4,7 @@ use super::golden;
 use crate::compare::{Limits, Side, compare, html};
 use crate::files::atomic;
 use crate::film::Film;
+use crate::output::Extra;
 use crate::provenance::Provenance;
 use std::io::Write;
 use std::path::Path;
@@ -46,7 +47,7 @@ pub fn assert_golden(path: &Path, film: &Film, provenance: &Provenance) {
     let mut provenance = provenance.clone();
     provenance.describe(film);
     if std::env::var_os(BLESS).is_some() {
-        if let Err(e) = golden::write(path, film, &provenance) {
+        if let Err(e) = golden::write(path, film, &provenance, &Extra::default()) {
             panic!("{e}");
         }
         return;

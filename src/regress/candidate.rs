@@ -3,7 +3,7 @@
 use super::golden::{
     self, Bless, Facts, MOST_SAMPLES, NO_EVIDENCE, Wanted, no_evidence, smallest_change,
 };
-use super::{Case, MakeEngine, Trouble, render, short, text};
+use super::{Case, MakeEngine, Trouble, layers, render, short, text};
 use crate::compare::Side;
 use crate::files::FileError;
 use crate::film::coverage::Rect;
@@ -25,6 +25,7 @@ const FIRST_LOOK: u64 = 64;
 
 /// A picture that may become a golden.
 pub struct Candidate {
+    scene: Scene,
     film: Film,
     provenance: Provenance,
     picture: Side,
@@ -84,6 +85,7 @@ impl Candidate {
             return Err(no_evidence(&path.display().to_string(), "raise --max-spp").into());
         }
         Ok(Some(Self {
+            scene,
             film,
             provenance,
             picture,
@@ -118,6 +120,7 @@ impl Candidate {
         Ok(Self {
             power: smallest_change(&picture, wanted.alpha),
             samples: facts.samples,
+            scene,
             film,
             provenance,
             picture,
@@ -134,7 +137,10 @@ impl Candidate {
         let golden = case.golden_path();
         let folder = case.dir.join("golden");
         std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-        golden::write(&golden, &self.film, &self.provenance).map_err(text)?;
+        // A golden keeps its layers, whoever makes it again.
+        let layers = [&wanted.layers[..], &layers::held(&golden)].concat();
+        let beside = layers::made(&self.scene, &self.provenance.settings, &layers);
+        golden::write(&golden, &self.film, &self.provenance, &beside).map_err(text)?;
         case.clear();
         let file = std::fs::metadata(&golden).map_err(|e| format!("{}: {e}", golden.display()))?;
         Ok(Bless {

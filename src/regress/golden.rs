@@ -1,9 +1,11 @@
 //! Golden pictures: rendered with just enough samples, and read back with their settings.
 
+use super::layers;
 use crate::compare::{Side, verdict::verdict};
 use crate::files::FileError;
 use crate::film::Film;
-use crate::output::{ExrChannels, write_exr};
+use crate::layers::Layer;
+use crate::output::{ExrChannels, Extra, write_exr_with};
 use crate::provenance::{Provenance, integrator_name, light_name};
 use crate::scene::Scene;
 use crate::settings::{Integrator, LightParts, Overrides, Settings};
@@ -18,7 +20,7 @@ const POWER: f64 = 0.01;
 pub(super) const MOST_SAMPLES: u64 = 4096;
 
 /// How to make goldens.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Wanted {
     /// Width and height; by default the scene's, scaled to 64 pixels wide.
     pub size: Option<[u32; 2]>,
@@ -28,6 +30,8 @@ pub struct Wanted {
     pub most_samples: Option<u64>,
     /// The false-alarm rate of that comparison.
     pub alpha: f64,
+    /// Layers that they hold, beside those that the goldens before them held.
+    pub layers: Vec<Layer>,
 }
 
 impl Wanted {
@@ -43,6 +47,12 @@ impl Wanted {
             && self
                 .power
                 .is_none_or(|power| smallest_change(golden, self.alpha) <= power)
+    }
+
+    /// Whether the golden in a file has the layers.
+    pub(super) fn has_layers(&self, golden: &Path) -> bool {
+        let held = layers::held(golden);
+        self.layers.iter().all(|l| held.contains(l))
     }
 }
 
@@ -99,12 +109,17 @@ impl Bless {
 }
 
 /// Writes a golden. The time that it took is left out, so that the same picture is the same file.
-pub(super) fn write(path: &Path, film: &Film, provenance: &Provenance) -> Result<(), FileError> {
+pub(super) fn write(
+    path: &Path,
+    film: &Film,
+    provenance: &Provenance,
+    beside: &Extra,
+) -> Result<(), FileError> {
     let untimed = Provenance {
         seconds: 0.0,
         ..provenance.clone()
     };
-    write_exr(path, film, &untimed, ExrChannels::All)
+    write_exr_with(path, film, &untimed, ExrChannels::All, beside)
 }
 
 /// A golden is no evidence if comparisons with it do not detect a change of the whole picture's brightness by so much: it holds

@@ -8,6 +8,7 @@
 mod assertion;
 mod candidate;
 mod golden;
+mod layers;
 #[doc(hidden)]
 pub mod report;
 mod summary;
@@ -23,6 +24,7 @@ use crate::engine::Engine;
 use crate::files::{FileError, atomic};
 use crate::film::Film;
 use crate::film::coverage::Rect;
+use crate::layers::Layer;
 use crate::output::store;
 use crate::provenance::Provenance;
 use crate::run::{self, Job, Run, StopReason};
@@ -197,11 +199,12 @@ impl Case {
             .join(format!("{}.{ending}", self.name))
     }
 
-    /// Renders and compares. `None` when `stop` was set.
+    /// Renders and compares, the golden's `layers` too. `None` when `stop` was set.
     pub fn run(
         &self,
         engine: &MakeEngine,
         limits: &Limits,
+        layers: &[Layer],
         stop: &AtomicBool,
     ) -> Option<(Outcome, Option<[Side; 2]>)> {
         match (self.scene, self.golden) {
@@ -215,7 +218,7 @@ impl Case {
             }
             _ => {}
         }
-        let judged = match self.judge(engine, limits, stop) {
+        let judged = match self.judge(engine, limits, layers, stop) {
             Ok(judged) => judged?,
             Err(trouble) => return Some((trouble.into(), None)),
         };
@@ -245,7 +248,10 @@ impl Case {
             Some(Ok(golden)) if !wanted.met_by(&golden) => {
                 Some("it has another size, or other samples than asked for".into())
             }
-            Some(Ok(_)) => match self.judge(engine, limits, stop) {
+            Some(Ok(_)) if !wanted.has_layers(&self.golden_path()) => {
+                Some("it lacks layers that were asked for".into())
+            }
+            Some(Ok(_)) => match self.judge(engine, limits, &wanted.layers, stop) {
                 Ok(None) => return None,
                 Ok(Some(judged)) if judged.comparison.same() => {
                     self.clear();
@@ -282,6 +288,7 @@ impl Case {
         &self,
         engine: &MakeEngine,
         limits: &Limits,
+        layers: &[Layer],
         stop: &AtomicBool,
     ) -> Result<Option<Judged>, Trouble> {
         let golden = Side::read(&self.golden_path()).map_err(text)?;
@@ -294,9 +301,15 @@ impl Case {
         facts.check_settings(&scene, "the golden", &remedy)?;
         let settings = facts.settings(&scene);
         let mut provenance = Provenance::new(&scene, source, &settings);
+        let layers = layers::differing(&self.golden_path(), &scene, &settings, layers);
         if provenance.scene_hash != facts.scene_hash {
+            let seen = match layers {
+                Ok(changes) if changes.is_empty() => String::new(),
+                Ok(changes) => format!("; {}", changes.join("; ")),
+                Err(why) => format!("; {why}"),
+            };
             return Err(format!(
-                "{} is of another scene than {} (hash {} and {}); {remedy}",
+                "{} is of another scene than {} (hash {} and {}){seen}; {remedy}",
                 self.golden_path().display(),
                 self.scene_path().display(),
                 short(&facts.scene_hash),
@@ -304,6 +317,7 @@ impl Case {
             )
             .into());
         }
+        let layers = layers?;
         golden::check_evidence(&golden, limits.alpha, provenance.black)?;
         let world = World::new(&scene, settings.size);
         let (mut engine, tile) = engine(&world, &settings)?;
@@ -323,6 +337,7 @@ impl Case {
         let actual = Side::from_film(name, &film, &provenance)?;
         let mut comparison = compare(&golden, &actual, limits).map_err(text)?;
         comparison.labels = LABELS;
+        comparison.layers = layers;
         Ok(Some(Judged {
             pictures: [golden, actual],
             comparison,

@@ -45,19 +45,6 @@ pub fn hollow(values: &[f64], width: usize, sigma: f64) -> Vec<f64> {
     all
 }
 
-/// The sums over each pixel and its eight neighbours.
-pub fn nine(values: &[f64], width: usize) -> Vec<f64> {
-    const ONES: [f64; 3] = [1.0; 3];
-    let height = values.len() / width;
-    let pixel = |i: usize| {
-        let (x, y) = (i % width, i / width);
-        sum(&ONES, y, height, |v| {
-            sum(&ONES, x, width, |u| values[v * width + u])
-        })
-    };
-    (0..values.len()).into_par_iter().map(pixel).collect()
-}
-
 fn kernel(sigma: f64) -> Vec<f64> {
     let reach = (REACH * sigma + 0.5) as i32;
     let weights = (-reach..=reach).map(|x| (-f64::from(x * x) / (2.0 * sigma * sigma)).exp());

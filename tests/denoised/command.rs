@@ -201,6 +201,30 @@ fn any_denoiser_is_judged_by_six_halves() {
     bench.run("develop g.npz --denoised exr -o g.exr").success();
 }
 
+/// What is held beside the film, which has some 340 bytes a pixel itself. The denoiser's own memory is not in it.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_a_pixel_is_bounded() {
+    let bench = Bench::new();
+    let peak = |size: &str| {
+        bench.render(&format!(
+            "--spp 4 --strata 1 --size {size} --film {size}.npz -o a.png"
+        ));
+        bench
+            .run(&format!("develop {size}.npz --folds {size}"))
+            .success();
+        copy_halves(&bench, size);
+        bench.peak(&format!(
+            "develop {size}.npz --denoised {size} -o a.exr --quiet"
+        )) as f64
+    };
+    let (few, many) = (peak("24x16"), peak("480x320"));
+    let of_pixel = (many - few) / f64::from(480 * 320 - 24 * 16);
+    println!("{of_pixel:.0} bytes a pixel");
+    // What is held for certain: the film, four replicates, six denoised pictures.
+    assert!(of_pixel > 400.0 && of_pixel < 700.0, "{of_pixel}");
+}
+
 #[test]
 fn films_without_four_replicates_are_refused() {
     let bench = Bench::new();

@@ -10,10 +10,11 @@ mod command;
 
 use etendue::denoise::oidn::Oidn;
 
-/// Open Image Denoise, if it is there.
+/// Open Image Denoise, if it is there. Where ETENDUE_OIDN names it, it must be.
 pub fn oidn() -> Option<Oidn> {
     match Oidn::load(None, None) {
         Ok(oidn) => Some(oidn),
+        Err(why) if std::env::var_os("ETENDUE_OIDN").is_some() => panic!("{why}"),
         Err(why) => {
             eprintln!("LEFT OUT: {why}");
             None

@@ -136,24 +136,7 @@ fn peak_in_films(bench: &Bench, size: [u32; 2], films: u64) -> f64 {
         slice(&bench.path(name), size, k as u64);
     }
     let one = fs::metadata(bench.path("0.npz")).expect("a film").len();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_etendue"))
-        .current_dir(bench.dir.path())
-        .args(["merge", "sum.npz", "--quiet"])
-        .args(&names)
-        .spawn()
-        .expect("it starts");
-    // The high-water mark of resident memory never falls: the last one seen is that of the whole run but for the
-    // last milliseconds, in which the sum is synced to disk.
-    let mut peak = 0;
-    while child.try_wait().expect("its state").is_none() {
-        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
-        let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-        if let Some(kib) = line.and_then(|l| l.split_whitespace().next()) {
-            peak = kib.parse::<u64>().expect("a number") * 1024;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(2));
-    }
-    assert!(child.wait().expect("its end").success());
+    let peak = bench.peak(&format!("merge sum.npz --quiet {}", names.join(" ")));
     let sum = store::load(&bench.path("sum.npz")).expect("a film").0;
     assert_eq!(sum.coverage.samples().0, films * 256);
     let all = (films * (films - 1) / 2) as f64;

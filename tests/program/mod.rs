@@ -94,6 +94,30 @@ impl Bench {
             .success();
     }
 
+    /// Runs `etendue ARGS`, which must succeed. Returns the most memory that it ever held, in bytes.
+    #[cfg(target_os = "linux")]
+    pub fn peak(&self, args: &str) -> u64 {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_etendue"))
+            .current_dir(self.dir.path())
+            .args(args.split_whitespace())
+            .spawn()
+            .expect("it starts");
+        // The high-water mark of resident memory never falls: the last one seen is that of the whole run but for the
+        // last milliseconds, in which files are synced to disk.
+        let mut peak = 0;
+        while child.try_wait().expect("its state").is_none() {
+            let status =
+                fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+            let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+            if let Some(kib) = line.and_then(|l| l.split_whitespace().next()) {
+                peak = kib.parse::<u64>().expect("a number") * 1024;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert!(child.wait().expect("its end").success());
+        peak
+    }
+
     pub fn picture(&self, name: &str) -> Picture {
         read_exr(&self.path(name)).expect("a picture of ours")
     }

@@ -1,6 +1,7 @@
 //! `etendue regress` and the assertion, on the CPU reference.
 
 mod accept;
+mod layers;
 mod refused;
 
 use assert_cmd::Command;

@@ -3,6 +3,7 @@
 use super::{Backend, Talk};
 use crate::cli::values;
 use crate::compare::DEFAULT_ALPHA;
+use crate::layers::Layer;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -76,7 +77,7 @@ Each scene DIR/NAME.toml is rendered with the settings and sample count of its g
 a different seed. The two are compared as by `etendue compare`. A scene that differs leaves golden/NAME.actual.npz and \
 golden/NAME.report.html.
 
---bless leaves goldens alone that still pass, unless --size, --power or --max-spp asks for others. --review and --accept change only goldens of scenes that fail, are new, or were changed.
+--bless leaves goldens alone that still pass, unless --size, --power, --max-spp or --layers asks for others. --review and --accept change only goldens of scenes that fail, are new, or were changed.
 
 Examples:
   etendue regress scenes --bless
@@ -85,6 +86,8 @@ Examples:
       the films of a failed run in CI become the goldens
   etendue regress scenes --junit results.xml --html results.html
   etendue regress scenes --filter glass
+  etendue regress scenes --bless --layers id,depth
+      goldens that hold what is seen where, too
 
 Exit status: 0 all passed; 1 one failed, or a scene or its golden is missing; 2 one can't be compared (the scene has errors, \
 or its golden is damaged or of another scene), or there is nothing to compare; 3 no usable adapter, or the device failed; 4 the \
@@ -115,6 +118,10 @@ pub struct RegressArgs {
     #[arg(long, value_name = "P", default_value_t = DEFAULT_ALPHA, value_parser = values::probability,
           allow_hyphen_values = true)]
     pub alpha: f64,
+    /// Compare these layers of the goldens too, separated by commas: they must be equal but for rounding (see docs/layers.md). With
+    /// --bless, --review or --accept, goldens get them. Without it layers are ignored
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    pub layers: Vec<Layer>,
     /// Write the results as JUnit XML. With - they go to stdout, and the list goes to stderr
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,

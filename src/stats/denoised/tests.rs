@@ -285,6 +285,44 @@ fn what_is_not_known_is_not_stated() {
     assert!(matches!(judged.statement.mean, Rms::Unknown(_)));
 }
 
+/// A thousandth of the pixels has nearly all of the error. They are in different blocks, so the spread of blocks alone would let it pass.
+#[test]
+fn an_error_that_a_thousandth_of_the_pixels_has_is_not_known() {
+    let mut few = replicates(&truth(), 5, [4; 4]);
+    for (r, replicate) in few.iter_mut().enumerate() {
+        for (x, y) in [(4, 4), (30, 12), (50, 28), (20, 44)] {
+            replicate[y * WIDTH + x] = [1e3 * r as f32; 3];
+        }
+    }
+    for (name, denoiser) in DENOISERS {
+        let statement = judge(&few, &folds(&few, denoiser), WIDTH, None).statement;
+        assert_eq!(statement.raw, Rms::Unknown(Why::Few), "{name}");
+        // A median loses these pixels altogether, and so has all of the error there.
+        assert_eq!(statement.mean, Rms::Unknown(Why::Few), "{name}");
+    }
+}
+
+/// Those with the largest estimates would seem to have most of the error of a good denoiser: their noise is much larger than it is.
+#[test]
+fn noise_alone_is_not_taken_for_a_few_bad_pixels() {
+    let own = replicates(&truth(), 5, [4; 4]);
+    // What is left is a thirtieth of the noise, everywhere alike.
+    let truth = truth();
+    let good = folds(&own, |half| {
+        let near = half.iter().zip(&truth);
+        near.map(|(h, t)| [0, 1, 2].map(|c: usize| t[c] + 0.15 * (h[c] - t[c])))
+            .collect()
+    });
+    let found = squares(&own, &good);
+    let mut largest = found.mean.clone();
+    largest.sort_by(|a, b| b.total_cmp(a));
+    let few = (FEW * largest.len() as f64).ceil() as usize;
+    let sum = |of: &[f64]| of.iter().sum::<f64>();
+    assert!(sum(&largest[..few]) > MUCH * sum(&largest));
+    let stated = judge(&own, &good, WIDTH, None).statement.mean;
+    assert!(matches!(stated, Rms::Known { .. }), "{stated}");
+}
+
 /// A median loses most of a highlight of four pixels. The surroundings, where it does well, do not see that.
 #[test]
 fn a_highlight_that_a_denoiser_loses_stays() {
