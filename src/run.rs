@@ -31,9 +31,10 @@ const MIN_CHECKED_SAMPLES: u64 = 16;
 const FIRST_PASS: u64 = 64;
 
 /// Bytes of splats that may wait for the samples that they go with, in a picture of so many pixels: passes through the tiles are shorter
-/// where there would be more. A quarter of the film, and more in small pictures.
+/// where there would be more. A quarter of the film, but more of a small one, and less of a large one,
+/// whose passes have no more light paths.
 pub(crate) fn waiting_bytes(pixels: u64) -> u64 {
-    (32 << 20).max(84 * pixels)
+    pixels.saturating_mul(84).clamp(32 << 20, 2 << 30)
 }
 
 /// The work of a run.

@@ -154,7 +154,7 @@ mod tests {
             let message = check(1 << 40, false).unwrap_err().to_string();
             assert!(message.contains("255087.1 GB"), "{message}");
             let message = check(1 << 40, true).unwrap_err().to_string();
-            assert!(message.contains("413416.8 GB"), "{message}");
+            assert!(message.contains("413418.9 GB"), "{message}");
         }
     }
 
