@@ -90,6 +90,22 @@ f = 'x'
 rotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 bounds = { radius = 3 }
 material = 'glass'
+[[isosurface]]
+file = 'scenes/density.npy'
+order = 'zyx'
+level = 1e4
+inside = 'above'
+origin = [-1, -1, -1]
+spacing = [0.05, 0.05, 0.05]
+rotation = { axis = [0, 1, 0], angle = 400 }
+closed = false
+material = 'gloss'
+[[isosurface]]
+file = 'scenes/density.npy'
+level = 2e4
+origin = [-1, -1, -1]
+spacing = [0.05, 0.05, 0.05]
+material = 'glass'
 [[light]]
 center = [0, 4, 0]
 normal = [0, -1, 0]
