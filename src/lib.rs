@@ -39,11 +39,11 @@ pub mod scene;
 
 pub use engine::{Counters, DeviceInfo};
 pub use files::FileError;
+pub use files::npy::Numbers;
 pub use film::coverage::Rect;
 pub use film::error::{Doubt, RelativeError};
 pub use film::{Estimate, Film};
 pub use glam::{DMat3, DVec3};
-pub use files::npy::Numbers;
 pub use implicit::{Clip, Grid, Implicit, Volume, WrongFormula};
 pub use provenance::{DeviceUse, Provenance};
 pub use render::{

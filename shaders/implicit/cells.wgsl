@@ -6,15 +6,15 @@ struct CellStep {
     cell: vec3i,
 }
 
-// The ray q + t w leaves the aligned cube of cells around `cell` with the side 2^bits. It was in the cell at `from`.
-fn beyond_cube(q: vec3f, w: vec3f, inverse: vec3f, cell: vec3i, bits: u32, from: f32) -> CellStep {
+// The ray q + t w leaves the aligned cube of cells around `cell` with the side 2^bits. It was in the cell at `since`.
+fn beyond_cube(q: vec3f, w: vec3f, inverse: vec3f, cell: vec3i, bits: u32, since: f32) -> CellStep {
     let side = vec3i(1i << bits);
     let low = (cell >> vec3u(bits)) << vec3u(bits);
     let forward = inverse > vec3f(0.0);
     let ends = (vec3f(select(low, low + side, forward)) - q) * inverse;
     let x = ends.x <= ends.y && ends.x <= ends.z;
     let y = !x && ends.y <= ends.z;
-    let t = fmax(fmin(ends.x, fmin(ends.y, ends.z)), from);
+    let t = fmax(fmin(ends.x, fmin(ends.y, ends.z)), since);
     // Along the other axes it is still beside the cube, whatever rounding says.
     let beside = clamp(vec3i(floor(q + t * w)), low, low + side - vec3i(1));
     let next = select(low - vec3i(1), low + side, forward);
@@ -79,7 +79,7 @@ fn narrower(b: Bracket, first: f32, c: vec3f) -> Bracket {
     let low = select(b.low, b.u, value > 0.0);
     let high = select(b.u, b.high, value > 0.0);
     let guess = b.u - value / select(slope, -TINY, abs(slope) < TINY);
-    return Bracket(low, high, select(0.5 * (low + high), guess, guess > low && guess < high));
+    return Bracket(low, high, select(0.5 * (low + high), guess, guess >= low && guess <= high));
 }
 
 // The first root of a cubic that is above 0 at 0; 2 if there is none up to 1. Between the places at which it is level it falls or rises
@@ -99,6 +99,8 @@ fn first_root(b: vec4f) -> f32 {
     let below = select(select(b.w, v.y, in_second), v.x, in_first);
     let chord = low + (high - low) * clamp(above / fmax(above - below, TINY), 0.0, 1.0);
     var part = Bracket(low, high, chord);
+    part = narrower(part, b.x, c);
+    part = narrower(part, b.x, c);
     part = narrower(part, b.x, c);
     part = narrower(part, b.x, c);
     part = narrower(part, b.x, c);

@@ -80,10 +80,10 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         let next = beyond_cube(q, w, inverse, cell, 0u, a);
         let b = fmin(next.t, end);
         let corner = vec3f(cell);
-        let from = clamp(q + a * w - corner, vec3f(0.0), vec3f(1.0));
-        let to = clamp(q + b * w - corner, vec3f(0.0), vec3f(1.0));
+        let enter = clamp(q + a * w - corner, vec3f(0.0), vec3f(1.0));
+        let leave = clamp(q + b * w - corner, vec3f(0.0), vec3f(1.0));
         let values = $name_cell(cell);
-        let cubic = sign * cell_cubic(values, from, to);
+        let cubic = sign * cell_cubic(values, enter, leave);
         let blur = $noise * largest_of(values);
         let u = select(root_after_start(cubic, blur), select(first_root(cubic), 0.0, cubic.x <= 0.0), clear);
         met = goes && u <= 1.0;

@@ -231,7 +231,10 @@ mod tests {
             read(&file(descr, &[1, 1, 2], bytes)[..], 3, 100).map(|a| a.numbers)
         };
         assert_eq!(read("|u1", &[3, 200]), Ok(Numbers::U8(vec![3, 200])));
-        assert_eq!(read("<u2", &[1, 2, 3, 4]), Ok(Numbers::U16(vec![513, 1027])));
+        assert_eq!(
+            read("<u2", &[1, 2, 3, 4]),
+            Ok(Numbers::U16(vec![513, 1027]))
+        );
         assert_eq!(read(">u2", &[1, 2, 3, 4]), Ok(Numbers::U16(vec![258, 772])));
         let floats = [1.5f32, -2.0];
         let big: Vec<u8> = floats.iter().flat_map(|x| x.to_be_bytes()).collect();

@@ -142,11 +142,10 @@ impl Probe {
                 resource: b.as_entire_binding(),
             }),
         });
-        let scene = (self.scene.as_ref().zip(world))
-            .map(|((layout, access), world)| {
-                let packed = pack(world, *access);
-                scene::bind(gpu, layout, &packed, world)
-            });
+        let scene = (self.scene.as_ref().zip(world)).map(|((layout, access), world)| {
+            let packed = pack(world, *access);
+            scene::bind(gpu, layout, &packed, world)
+        });
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());

@@ -53,7 +53,9 @@ pub(super) fn textures(gpu: &Gpu, world: &World) -> Vec<(u32, wgpu::TextureView)
 pub(super) fn too_large(world: &World, limits: &wgpu::Limits) -> Option<String> {
     let most = limits.max_texture_dimension_3d as usize;
     let all = volumes(world);
-    let large = all.iter().find(|(grid, _)| grid.volume.size().iter().any(|n| *n > most));
+    let large = all
+        .iter()
+        .find(|(grid, _)| grid.volume.size().iter().any(|n| *n > most));
     large.map(|(grid, _)| {
         let [x, y, z] = grid.volume.size();
         format!(
@@ -91,7 +93,9 @@ fn cubes(gpu: &Gpu, grid: &Grid, level: f64) -> wgpu::TextureView {
     let texture = texture(gpu, cells, wgpu::TextureFormat::R8Uint);
     let all = grid.volume.hierarchy(level);
     let slab = cells[0] * cells[1];
-    upload(gpu, &texture, cells, |from, to| all[from * slab..to * slab].to_vec());
+    upload(gpu, &texture, cells, |from, to| {
+        all[from * slab..to * slab].to_vec()
+    });
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 

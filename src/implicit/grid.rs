@@ -1,7 +1,7 @@
 //! A volume where it stands in a surface's own space, and what of it is the inside of a solid.
 
-use super::interval::{Interval, Varying};
 use super::arithmetic::Arithmetic as _;
+use super::interval::{Interval, Varying};
 use super::volume::{AxisOrder, Trilinear, Volume};
 use glam::DVec3;
 use std::sync::Arc;
@@ -42,7 +42,9 @@ impl Grid {
     pub fn gain(&self, level: f64) -> f64 {
         let [low, high] = self.volume.range();
         // Halves, whose difference is finite.
-        let most = (0.5 * low - 0.5 * level).abs().max((0.5 * high - 0.5 * level).abs());
+        let most = (0.5 * low - 0.5 * level)
+            .abs()
+            .max((0.5 * high - 0.5 * level).abs());
         let exponent = (most.to_bits() >> 52) as i64 - 1023;
         let unit = match most {
             0.0 => 1.0,
@@ -74,7 +76,9 @@ impl Grid {
 
     /// What the function less the level, times the gain, may be within `reach` of `q`, axis by axis.
     pub fn heights(&self, q: DVec3, reach: DVec3, level: f64) -> Interval {
-        let values = self.volume.between(self.in_cells(q - reach), self.in_cells(q + reach));
+        let values = self
+            .volume
+            .between(self.in_cells(q - reach), self.in_cells(q + reach));
         let gain = self.gain(level);
         let [a, b] = [values.low, values.high].map(|v| v * gain - level * gain);
         Interval::new(a.min(b), a.max(b))
@@ -99,7 +103,11 @@ pub(super) struct Along {
 impl Along {
     pub fn new(cell: &Trilinear, start: DVec3, step: DVec3) -> Self {
         let monomials = cell.monomials();
-        Self { monomials, start, step }
+        Self {
+            monomials,
+            start,
+            step,
+        }
     }
 
     /// The function and its derivative between two places of the ray.

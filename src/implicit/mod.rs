@@ -3,6 +3,7 @@
 pub mod arithmetic;
 pub mod formula;
 pub mod grid;
+pub mod hierarchy;
 pub mod interval;
 mod parse;
 pub mod roots;

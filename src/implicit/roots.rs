@@ -4,8 +4,8 @@
 //! all that the ray passes, without any hierarchy.
 
 use super::arithmetic::Arithmetic as _;
-use super::{Implicit, grid};
 use super::interval::{Interval, Varying};
+use super::{Implicit, grid};
 use glam::DVec3;
 
 /// The part of a closed surface that its formula makes.
@@ -109,7 +109,11 @@ impl Along<'_> {
     /// not meet that one.
     fn first(&mut self, low: f64, high: f64, mut on: bool) -> Option<f64> {
         let Some(grid) = self.implicit.grid() else {
-            let low = if on { self.beyond_start(low, high) } else { low };
+            let low = if on {
+                self.beyond_start(low, high)
+            } else {
+                low
+            };
             return self.first_of_part(low, high);
         };
         // Every cell that the ray passes, one after the other.
@@ -197,7 +201,11 @@ impl Along<'_> {
         while reach > self.finest {
             if self.over(start, start + reach).slope.low > 0.0 {
                 // Not a rounding less than the end.
-                return if reach == end - start { end } else { start + reach };
+                return if reach == end - start {
+                    end
+                } else {
+                    start + reach
+                };
             }
             reach *= 0.5;
         }
@@ -232,7 +240,11 @@ impl Implicit {
         let from = enter.max(0.0);
         if !self.closed {
             let (height, gradient) = self.sloped(q + w * from);
-            let value = if on_root(from) { gradient.dot(w) } else { height };
+            let value = if on_root(from) {
+                gradient.dot(w)
+            } else {
+                height
+            };
             let sign = if value < 0.0 { -1.0 } else { 1.0 };
             let root = first(sign, from, leave, on_root(from));
             return root.map(|t| (t, SURFACE));

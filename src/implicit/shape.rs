@@ -1,9 +1,9 @@
 //! An implicit surface in a scene: a function, where it is looked at, and where that part of it stands.
 
-use super::{Formula, Grid};
 use super::arithmetic::{Arithmetic as _, Sloped};
 use super::interval::Interval;
 use super::parse::{self, WrongFormula};
+use super::{Formula, Grid};
 use glam::{DMat3, DVec3};
 
 /// The part of its own space in which a surface is looked for.

@@ -53,7 +53,7 @@ impl fmt::Debug for Volume {
 }
 
 /// A type of numbers in volumes.
-trait Number: bytemuck::Pod + Send + Sync {
+pub(super) trait Number: bytemuck::Pod + Send + Sync {
     fn wide(self) -> f64;
 }
 
@@ -93,6 +93,8 @@ macro_rules! with_numbers {
     };
 }
 
+pub(super) use with_numbers;
+
 impl Volume {
     /// The volume of these numbers, x fastest: those of `size[0]` points along x, and so on.
     ///
@@ -108,7 +110,7 @@ impl Volume {
                 ));
             }
         }
-        let count = size.iter().product();
+        let count: usize = size.iter().product();
         let given = with_numbers!(&numbers, all => all.len());
         if given != count {
             return Err(format!(
@@ -231,7 +233,8 @@ impl Volume {
                 let corner = DVec3::from_array(at.map(|n| n as f64));
                 let [low, high] = [low, high].map(|p| (p - corner).clamp(DVec3::ZERO, DVec3::ONE));
                 for k in 0..8 {
-                    let side = |bit: usize, i: usize| if k >> bit & 1 == 0 { low[i] } else { high[i] };
+                    let side =
+                        |bit: usize, i: usize| if k >> bit & 1 == 0 { low[i] } else { high[i] };
                     let value = cell.value(DVec3::new(side(0, 0), side(1, 1), side(2, 2)));
                     add([value, value]);
                 }
@@ -241,112 +244,10 @@ impl Volume {
         let slack = 8.0 * f64::EPSILON * self.range[0].abs().max(self.range[1].abs());
         Interval::new(all[0] - slack, all[1] + slack)
     }
-
-    /// For each cell, x fastest, how the ray of a kernel may pass it. 0: the function may be `level` in it. Otherwise the aligned cube of
-    /// cells around it with the side 2ⁿ, the largest, has none such: n + 1, and [`BELOW`] more where the function is below the level.
-    ///
-    /// These are the nodes of a min–max hierarchy \[Wald2005\], as far as one level needs them.
-    pub fn hierarchy(&self, level: f64) -> Vec<u8> {
-        let cells = self.cells();
-        let first = with_numbers!(&self.numbers, all => sides(self.size, all, level));
-        let mut levels = vec![(cells, first)];
-        while let Some((size, finer)) = levels.last()
-            && size.iter().any(|n| *n > 1)
-        {
-            let next = coarser(*size, finer);
-            levels.push(next);
-        }
-        let mut codes = vec![0; cells.iter().product()];
-        codes
-            .par_chunks_mut(cells[0] * cells[1])
-            .enumerate()
-            .for_each(|(z, slab)| {
-                for (i, code) in slab.iter_mut().enumerate() {
-                    let at = [i % cells[0], i / cells[0], z];
-                    let uniform = |n: usize| {
-                        let (size, sides) = &levels[n];
-                        let [x, y, z] = at.map(|k| k >> n);
-                        sides[x + size[0] * (y + size[1] * z)]
-                    };
-                    let side = uniform(0);
-                    if side != MIXED {
-                        let mut n = 0;
-                        while n + 1 < levels.len() && uniform(n + 1) != MIXED {
-                            n += 1;
-                        }
-                        *code = n as u8 + 1 + if side == UNDER { BELOW } else { 0 };
-                    }
-                }
-            });
-        codes
-    }
-}
-
-/// What marks cells below the level in a [`hierarchy`](Volume::hierarchy).
-pub const BELOW: u8 = 64;
-
-const MIXED: u8 = 0;
-const OVER: u8 = 1;
-const UNDER: u8 = 2;
-
-/// On which side of the level all of each cell is, if all of it is on one.
-fn sides<T: Number>([nx, ny, nz]: [usize; 3], all: &[T], level: f64) -> Vec<u8> {
-    let [cx, cy, cz] = [nx - 1, ny - 1, nz - 1];
-    let mut cells = vec![MIXED; cx * cy * cz];
-    cells
-        .par_chunks_mut(cx * cy)
-        .enumerate()
-        .for_each(|(z, slab)| {
-            for (y, row) in slab.chunks_mut(cx).enumerate() {
-                let rows = [0, 1, 2, 3].map(|k| {
-                    let start = nx * (y + (k & 1) + ny * (z + (k >> 1)));
-                    &all[start..start + nx]
-                });
-                let column = |x: usize| {
-                    let four = rows.map(|row| row[x].wide());
-                    if four.iter().all(|v| *v > level) {
-                        OVER
-                    } else if four.iter().all(|v| *v < level) {
-                        UNDER
-                    } else {
-                        MIXED
-                    }
-                };
-                let mut left = column(0);
-                for (x, cell) in row.iter_mut().enumerate() {
-                    let right = column(x + 1);
-                    *cell = if left == right { left } else { MIXED };
-                    left = right;
-                }
-            }
-        });
-    cells
-}
-
-/// The same of cubes with twice the side.
-fn coarser(size: [usize; 3], finer: &[u8]) -> ([usize; 3], Vec<u8>) {
-    let [cx, cy, cz] = size.map(|n| n.div_ceil(2));
-    let mut cubes = vec![MIXED; cx * cy * cz];
-    cubes
-        .par_chunks_mut(cx * cy)
-        .enumerate()
-        .for_each(|(z, slab)| {
-            for (i, cube) in slab.iter_mut().enumerate() {
-                let low = [2 * (i % cx), 2 * (i / cx), 2 * z];
-                let high = [0, 1, 2].map(|k| (low[k] + 1).min(size[k] - 1));
-                let first = finer[low[0] + size[0] * (low[1] + size[1] * low[2])];
-                let mut same = true;
-                for_each(low, high, |[x, y, z]| {
-                    same &= finer[x + size[0] * (y + size[1] * z)] == first;
-                });
-                *cube = if same { first } else { MIXED };
-            }
-        });
-    ([cx, cy, cz], cubes)
 }
 
 /// Does `what` for every index from `low` to `high`, both included.
-fn for_each(low: [usize; 3], high: [usize; 3], mut what: impl FnMut([usize; 3])) {
+pub(super) fn for_each(low: [usize; 3], high: [usize; 3], mut what: impl FnMut([usize; 3])) {
     for z in low[2]..=high[2] {
         for y in low[1]..=high[1] {
             for x in low[0]..=high[0] {
@@ -366,7 +267,11 @@ fn bricks<T: Number>(size: [usize; 3], all: &[T]) -> Vec<[f64; 2]> {
     (0..count.iter().product())
         .into_par_iter()
         .map(|i: usize| {
-            let at = [i % count[0], i / count[0] % count[1], i / count[0] / count[1]];
+            let at = [
+                i % count[0],
+                i / count[0] % count[1],
+                i / count[0] / count[1],
+            ];
             let low = at.map(|n| n * BRICK);
             let high = [0, 1, 2].map(|k| (low[k] + BRICK).min(size[k] - 1));
             let mut ends = [f64::MAX, f64::MIN];
@@ -418,13 +323,8 @@ impl Trilinear {
     pub fn value(&self, f: DVec3) -> f64 {
         let mix = |a: f64, b: f64, t: f64| a * (1.0 - t) + b * t;
         let c = self.0;
-        let [low, high] = [0, 4].map(|k| {
-            mix(
-                mix(c[k], c[k + 1], f.x),
-                mix(c[k + 2], c[k + 3], f.x),
-                f.y,
-            )
-        });
+        let [low, high] =
+            [0, 4].map(|k| mix(mix(c[k], c[k + 1], f.x), mix(c[k + 2], c[k + 3], f.x), f.y));
         mix(low, high, f.z)
     }
 
@@ -479,7 +379,9 @@ mod tests {
             let mut numbers = Vec::new();
             let [a, b, c] = shape;
             if first_fastest {
-                for_each([0; 3], [a - 1, b - 1, c - 1], |at| numbers.push(value(at) as u16));
+                for_each([0; 3], [a - 1, b - 1, c - 1], |at| {
+                    numbers.push(value(at) as u16)
+                });
             } else {
                 for_each([0; 3], [c - 1, b - 1, a - 1], |[k, j, i]| {
                     numbers.push(value([i, j, k]) as u16);
@@ -524,22 +426,6 @@ mod tests {
         assert!((found.low - exact[0]).abs() < 1e-9 && (found.high - exact[1]).abs() < 1e-9);
         let all = volume.between(DVec3::splat(-9.0), DVec3::splat(99.0));
         assert!((all.low - 0.0).abs() < 1e-9 && (all.high - 232.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn empty_cubes_are_as_large_as_they_are() {
-        let side = 17;
-        let mut numbers = vec![0u8; side * side * side];
-        numbers[side * side * side - 1] = 9;
-        let volume = Volume::new([side; 3], Numbers::U8(numbers)).expect("a volume");
-        let codes = volume.hierarchy(4.5);
-        let code = |x: usize, y: usize, z: usize| codes[x + 16 * (y + 16 * z)];
-        assert_eq!(code(15, 15, 15), 0);
-        assert_eq!(code(14, 15, 15), BELOW + 1);
-        assert_eq!(code(13, 15, 15), BELOW + 2);
-        assert_eq!(code(0, 15, 15), BELOW + 4);
-        assert_eq!(volume.hierarchy(-1.0)[0], 5);
-        assert_eq!(volume.hierarchy(0.0)[0], 0, "it touches the level");
     }
 
     #[test]

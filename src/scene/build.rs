@@ -1,13 +1,12 @@
 //! Scenes built in code. They are written as a scene file and read like one: every rule of the format holds for them too.
 
-use super::{implicit, isosurface};
 use super::parse::parse_with_volumes;
 use super::source::quoted;
 use super::{Bsdf, Camera, Diagnostic, Light, Parameter, Place, Scene, Shape};
+use super::{implicit, isosurface};
 use crate::implicit::{Implicit, Volume};
 use glam::DVec3;
 use std::fmt::Write as _;
-use std::path::Path;
 use std::sync::Arc;
 
 /// How far the length of a unit vector may be from 1: a few roundings of f64.
@@ -433,7 +432,9 @@ fn string(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::provenance::hash::scene_hash;
+    use crate::scene::parse::parse_str;
     use crate::settings::{Overrides, Settings};
+    use std::path::Path;
 
     fn room() -> SceneBuilder {
         Scene::builder()

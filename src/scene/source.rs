@@ -62,9 +62,8 @@ impl<'a> Source<'a> {
 
     /// The volume in the file that the text calls `name`. It is read once.
     pub(super) fn volume(&self, name: &str, order: AxisOrder) -> Result<Arc<Volume>, NoVolume> {
-        let known = |(n, o, v): &Known| {
-            (n == name && o.is_none_or(|o| o == order)).then(|| v.clone())
-        };
+        let known =
+            |(n, o, v): &Known| (n == name && o.is_none_or(|o| o == order)).then(|| v.clone());
         if let Some(volume) = self.volumes.borrow().iter().find_map(known) {
             return Ok(volume);
         }

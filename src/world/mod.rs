@@ -162,7 +162,14 @@ impl World {
         let origin = scene_origin / unit;
         let eye = scene.camera.eye - origin;
         let mut primitives: Vec<WorldPrimitive> = Vec::with_capacity(scene.primitives.len());
-        for kind in ["disk", "cylinder", "plane", "sphere", "implicit", "isosurface"] {
+        for kind in [
+            "disk",
+            "cylinder",
+            "plane",
+            "sphere",
+            "implicit",
+            "isosurface",
+        ] {
             for p in scene.primitives.iter().filter(|p| p.shape.kind() == kind) {
                 primitives.push(WorldPrimitive {
                     geometry: Geometry::new(&p.shape, origin),

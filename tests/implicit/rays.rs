@@ -88,7 +88,8 @@ pub fn hits(world: &World, count: usize, seed: u64) -> Vec<DVec3> {
     let first = 4.0 * world.lights.len() as f32;
     let (_, outputs) = answers(world, count, seed);
     let met = outputs.iter().filter(|y| y[1] >= first);
-    met.map(|y| (vec(&y[2..5]) + world.origin) * world.unit).collect()
+    met.map(|y| (vec(&y[2..5]) + world.origin) * world.unit)
+        .collect()
 }
 
 /// Rays, and what the kernel says of them.
@@ -154,8 +155,7 @@ fn answers(world: &World, count: usize, seed: u64) -> (Vec<Values>, Vec<Values>)
     let access = Access::Baked;
     let parsed = settings_of(world);
     let source = scene_probe_source(world, &parsed, access, BODY);
-    let probe =
-        Probe::compile_for(&GPU, &source, Some(access), Some(world))
+    let probe = Probe::compile_for(&GPU, &source, Some(access), Some(world))
         .unwrap_or_else(|e| panic!("{e}\n{source}"));
     let outputs = probe
         .run(&GPU, Some(world), &inputs)

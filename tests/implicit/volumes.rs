@@ -48,16 +48,32 @@ fn volumes() -> Vec<(&'static str, Implicit)> {
         let [s, c] = [DVec3::sin, DVec3::cos].map(|f| f(5.0 * p));
         0.25 - (s.x * c.y + s.y * c.z + s.z * c.x).abs()
     };
-    let specks = (0..21usize.pow(3)).map(|i| if i % 97 == 13 { 60_000 } else { 40 * (i % 7) as u16 });
+    let specks = (0..21usize.pow(3)).map(|i| {
+        if i % 97 == 13 {
+            60_000
+        } else {
+            40 * (i % 7) as u16
+        }
+    });
     vec![
         ("ball", of([24; 3], floats(sampled([24; 3], ball)), 0.0)),
         (
             "blobs",
-            of([20, 31, 17], Numbers::F64(sampled([20, 31, 17], blobs)), 1e5 + 1.2),
+            of(
+                [20, 31, 17],
+                Numbers::F64(sampled([20, 31, 17], blobs)),
+                1e5 + 1.2,
+            ),
         ),
         ("gyroid", of([40; 3], floats(sampled([40; 3], gyroid)), 0.1)),
-        ("noise", of([12; 3], Numbers::U8(noise(12 * 12 * 12)), 127.5)),
-        ("specks", of([21; 3], Numbers::U16(specks.collect()), 59_000.0)),
+        (
+            "noise",
+            of([12; 3], Numbers::U8(noise(12 * 12 * 12)), 127.5),
+        ),
+        (
+            "specks",
+            of([21; 3], Numbers::U16(specks.collect()), 59_000.0),
+        ),
         (
             "wall",
             of([9, 5, 6], floats(sampled([9, 5, 6], |p| p.y + 0.3)), 0.05),
@@ -88,7 +104,13 @@ fn all(count: usize) {
                 "hollow" => {
                     let grid = implicit.grid().expect("a volume").clone();
                     let (level, center) = (implicit.level, implicit.center);
-                    implicit = Implicit::of_volume(Grid { above: false, ..grid }, level);
+                    implicit = Implicit::of_volume(
+                        Grid {
+                            above: false,
+                            ..grid
+                        },
+                        level,
+                    );
                     implicit.center = center;
                 }
                 "sheet" => {
@@ -140,7 +162,9 @@ fn distances(side: usize, radius: f64) -> Implicit {
 fn off_sphere(side: usize) -> [f64; 2] {
     let world = World::new(&scene_of(&distances(side, 0.8), "white"), [8, 8]);
     let hits = super::rays::hits(&world, 20_000, 3);
-    let off = hits.iter().map(|p| (*p - DVec3::splat(0.013)).length() - 0.8);
+    let off = hits
+        .iter()
+        .map(|p| (*p - DVec3::splat(0.013)).length() - 0.8);
     let (mut squares, mut most) = (0.0, 0.0f64);
     for o in off {
         squares += o * o;

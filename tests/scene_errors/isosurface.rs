@@ -91,7 +91,9 @@ fn keys_that_are_wrong() {
         one(&good, &with_key(key), message);
     }
     let keys = |spacing: &str, material: &str| {
-        format!("file = 'd.npy'\nlevel = 3\norigin = [0, 0, 0]\nspacing = {spacing}\nmaterial = '{material}'")
+        format!(
+            "file = 'd.npy'\nlevel = 3\norigin = [0, 0, 0]\nspacing = {spacing}\nmaterial = '{material}'"
+        )
     };
     one(
         &good,

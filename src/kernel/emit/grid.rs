@@ -5,7 +5,7 @@ use super::super::modules::IMPLICIT_GRID;
 use super::super::preprocess::fill;
 use super::implicit::{Sides, grids, name};
 use crate::files::npy::Numbers;
-use crate::implicit::volume::BELOW;
+use crate::implicit::hierarchy::BELOW;
 use crate::implicit::{Grid, Implicit};
 use crate::world::{World, WorldPrimitive, key};
 use glam::DVec3;
@@ -49,9 +49,7 @@ pub(super) fn surface(k: usize, number: usize, p: &WorldPrimitive, implicit: &Im
         ("u32", format!("{number} * {} + {shift}", float(gain)))
     };
     let binding = FIRST_BINDING + 2 * k as u32;
-    let mut s = format!(
-        "@group(0) @binding({binding}) var {name}_numbers: texture_3d<{texel}>;\n"
-    );
+    let mut s = format!("@group(0) @binding({binding}) var {name}_numbers: texture_3d<{texel}>;\n");
     let _ = writeln!(
         s,
         "@group(0) @binding({}) var {name}_cubes: texture_3d<u32>;\n",
@@ -66,9 +64,8 @@ pub(super) fn surface(k: usize, number: usize, p: &WorldPrimitive, implicit: &Im
     // A cell's sides in the scene.
     let sides = (grid.spacing * implicit.scale).to_array();
     let least = sides.into_iter().fold(f64::MAX, f64::min);
-    let each = |f: fn(DVec3, f64, f64) -> DVec3| {
-        [0, 1, 2].map(|k| vector(f(axes[k], sides[k], least)))
-    };
+    let each =
+        |f: fn(DVec3, f64, f64) -> DVec3| [0, 1, 2].map(|k| vector(f(axes[k], sides[k], least)));
     let rows = each(|axis, side, _| axis / side);
     let columns = each(|axis, side, _| axis * side);
     let normals = each(|axis, side, least| axis * (least / side));
