@@ -94,7 +94,7 @@ pub(super) fn corner(at: [usize; 3]) -> DVec3 {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Along {
     /// In the powers of the cell's coordinates.
-    monomials: [f64; 8],
+    monomials: [Varying; 8],
     /// The ray: where it is at 0, relative to the cell's first corner, and what it moves by.
     pub start: DVec3,
     pub step: DVec3,
@@ -102,7 +102,7 @@ pub(super) struct Along {
 
 impl Along {
     pub fn new(cell: &Trilinear, start: DVec3, step: DVec3) -> Self {
-        let monomials = cell.monomials();
+        let monomials = cell.monomials().map(Varying::number);
         Self {
             monomials,
             start,
@@ -117,7 +117,7 @@ impl Along {
             t.multiply(slope).add(Varying::number(self.start[k]))
         };
         let (x, y, z) = (at(0), at(1), at(2));
-        let c = self.monomials.map(Varying::number);
+        let c = &self.monomials;
         let face = |k: usize| {
             let along = c[k].add(c[k + 1].multiply(x));
             along.add(c[k + 2].add(c[k + 3].multiply(x)).multiply(y))

@@ -303,6 +303,9 @@ pub fn failures_of(name: &str, report: &Report, count: usize) -> Option<String> 
         report.turns,
         report.most_turns
     );
+    if let Some(example) = &report.example {
+        println!("{example}");
+    }
     assert!(report.hits > report.rays / 20, "{name}: {report:?}");
     assert!(report.at_once < count / 50, "{name}: {report:?}");
     let wrong = report.missed + report.ghosts + report.displaced + report.turned;

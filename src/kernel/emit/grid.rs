@@ -18,7 +18,7 @@ pub(crate) const FIRST_BINDING: u32 = 8;
 const REACH: f64 = 0.1;
 
 /// Roundings of a place, over the largest coordinate that it is made of.
-const ROUNDINGS: f64 = 4.0;
+const ROUNDINGS: f64 = 1.5;
 
 /// The volumes of a world, in the order of their bindings: each takes one for its numbers and one for its cubes.
 pub(crate) fn volumes(world: &World) -> Vec<(&Grid, f64)> {
@@ -102,8 +102,7 @@ pub(super) fn surface(k: usize, number: usize, p: &WorldPrimitive, implicit: &Im
             ("result", &surface.result),
             ("key", &format!("{}u", key(number, 0))),
             ("near", &float(slack)),
-            // The function changes by at most twice its largest value along each side.
-            ("noise", &float(6.0 * slack + 4.0 * f64::from(f32::EPSILON))),
+            ("noise", &float(3.0 * slack + 4.0 * f64::from(f32::EPSILON))),
             ("positive", if gain > 0.0 { "true" } else { "false" }),
             ("below", &format!("{BELOW}u")),
             ("newton", "2u"),
