@@ -203,13 +203,19 @@ impl Implicit {
         parse::may_name(name)
     }
 
-    /// The formula as it was written, and its parameters; none if it is a volume's surface.
-    pub fn text(&self) -> Option<(&str, &[(String, f64)])> {
+    /// The formula as it was written; nothing if it is a volume's surface.
+    pub fn text(&self) -> &str {
         match &self.function {
-            Function::Formula {
-                text, parameters, ..
-            } => Some((text, parameters)),
-            Function::Grid(_) => None,
+            Function::Formula { text, .. } => text,
+            Function::Grid(_) => "",
+        }
+    }
+
+    /// The formula's parameters.
+    pub fn parameters(&self) -> &[(String, f64)] {
+        match &self.function {
+            Function::Formula { parameters, .. } => parameters,
+            Function::Grid(_) => &[],
         }
     }
 

@@ -245,12 +245,9 @@ pub(super) fn rotation_text(rotation: DMat3) -> String {
 
 /// The keys of an implicit surface, as they stand in a file. `string` writes a string.
 pub(super) fn text(implicit: &Implicit, string: impl Fn(&str) -> String) -> String {
-    let Some((formula, parameters)) = implicit.text() else {
-        unreachable!("a volume's surface has a text of its own");
-    };
-    let mut s = format!("f = {}\n", string(formula));
-    if !parameters.is_empty() {
-        let all = parameters.iter();
+    let mut s = format!("f = {}\n", string(implicit.text()));
+    if !implicit.parameters().is_empty() {
+        let all = implicit.parameters().iter();
         let all: Vec<String> = all
             .map(|(name, x)| format!("{} = {}", string(name), number_text(*x)))
             .collect();
