@@ -164,6 +164,7 @@ fn valid(schema: &Value, value: &Value) -> bool {
                 .is_none_or(|a| a.iter().any(|v| valid(rule, v))),
             "not" => !valid(rule, value),
             "const" => value == rule || (rule.is_number() && value.as_f64() == rule.as_f64()),
+            "enum" => rule.as_array().expect("a list").contains(value),
             "minimum" => value.as_f64() >= rule.as_f64(),
             "maximum" => value.as_f64() <= rule.as_f64(),
             "exclusiveMinimum" => value.as_f64() > rule.as_f64(),

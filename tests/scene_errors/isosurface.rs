@@ -105,7 +105,11 @@ fn keys_that_are_wrong() {
         &(keys("[1, 1, 1]", "glass") + "\nclosed = false"),
         "an open surface is not solid",
     );
-    one(&good, REST, "missing key file in [[isosurface]]");
+    one(
+        &good,
+        &format!("level = 3\n{REST}"),
+        "missing key file in [[isosurface]]",
+    );
     let many = vec![keys("[1, 1, 1]", "white"); 9].join("\n[[isosurface]]\n");
     one(&good, &many, "more than 8 [[isosurface]]");
 }
