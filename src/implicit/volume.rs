@@ -380,7 +380,7 @@ mod tests {
             let [a, b, c] = shape;
             if first_fastest {
                 for_each([0; 3], [a - 1, b - 1, c - 1], |at| {
-                    numbers.push(value(at) as u16)
+                    numbers.push(value(at) as u16);
                 });
             } else {
                 for_each([0; 3], [c - 1, b - 1, a - 1], |[k, j, i]| {

@@ -49,7 +49,7 @@ fn volumes() -> Vec<(&'static str, Implicit)> {
         0.25 - (s.x * c.y + s.y * c.z + s.z * c.x).abs()
     };
     let specks = (0..21usize.pow(3)).map(|i| {
-        if i % 97 == 13 {
+        if i % 17 == 13 {
             60_000
         } else {
             40 * (i % 7) as u16
@@ -72,7 +72,7 @@ fn volumes() -> Vec<(&'static str, Implicit)> {
         ),
         (
             "specks",
-            of([21; 3], Numbers::U16(specks.collect()), 59_000.0),
+            of([21; 3], Numbers::U16(specks.collect()), 45_000.0),
         ),
         (
             "wall",
