@@ -5,8 +5,7 @@ use super::backend::{Backend, Trouble};
 use super::build::{Build, GLASS, MIRROR, grey, sphere, v};
 use super::measure::{Measure, Tolerance};
 use super::rays::{Dice, Landing, Range, Shot};
-use crate::files::npy::Numbers;
-use crate::implicit::{Grid, Implicit, Volume};
+use crate::implicit::Implicit;
 use crate::scene::{Bsdf, Shape};
 use glam::DVec3;
 use std::sync::Arc;
@@ -24,12 +23,6 @@ pub const CASES: &[Case] = &[
         what: "a white torus, a mirror ellipsoid and a glass torus, by their formulas, in the white dome: rays that leave surfaces",
         run: in_dome,
     },
-    Case {
-        row: "I3",
-        name: "volumes_in_dome",
-        what: "isosurfaces of noise, white and of glass, and of a mirror ball's distance in the white dome: cells with every kind of cubic",
-        run: volumes_in_dome,
-    },
 ];
 
 /// Half the thickness of the shell, whose middle has radius 1.
@@ -40,24 +33,6 @@ fn formula(text: &str, radius: f64, center: DVec3, scale: f64) -> Shape {
     let mut implicit = Implicit::new(text, &[]).unwrap_or_else(|e| panic!("{text}: {e}"));
     implicit.clip = crate::implicit::Clip::Ball { radius };
     (implicit.center, implicit.scale) = (center, scale);
-    Shape::Implicit(Arc::new(implicit))
-}
-
-/// An isosurface of a volume with so many points a side, whose numbers are those of `f` at points from -1 to 1.
-fn volume(side: usize, f: impl Fn(DVec3) -> f64, center: DVec3, half: f64) -> Shape {
-    let at = |k: usize| 2.0 * k as f64 / (side - 1) as f64 - 1.0;
-    let numbers = (0..side.pow(3)).map(|i| {
-        f(DVec3::new(
-            at(i % side),
-            at(i / side % side),
-            at(i / side / side),
-        )) as f32
-    });
-    let volume = Volume::new([side; 3], Numbers::F32(numbers.collect()));
-    let volume = volume.unwrap_or_else(|e| panic!("{e}"));
-    let spacing = DVec3::splat(2.0 * half / (side - 1) as f64);
-    let mut implicit = Implicit::of_volume(Grid::new(volume, spacing), 0.0);
-    implicit.center = center - half;
     Shape::Implicit(Arc::new(implicit))
 }
 
@@ -163,29 +138,9 @@ fn in_dome(b: &Backend) -> Result<Vec<Measure>, Trouble> {
         ),
         (formula(torus, 1.4, v(0.35, 0.4, 0.0), 0.16), GLASS),
     ];
-    things_in_dome(b, &things)
-}
-
-fn volumes_in_dome(b: &Backend) -> Result<Vec<Measure>, Trouble> {
-    let noise = |seed: u32| {
-        let dice = std::cell::RefCell::new(Dice::new(seed));
-        // Sparse enough to let light through, and away from the bounds.
-        move |p: DVec3| dice.borrow_mut().between(-1.0, 0.6) - 2.0 * p.length_squared()
-    };
-    let ball = |p: DVec3| 0.8 - p.length();
-    let things: [(Shape, Bsdf); 3] = [
-        (volume(10, noise(5), v(-0.35, 0.4, 0.0), 0.22), grey(1.0)),
-        (volume(14, ball, v(0.0, 0.45, -0.2), 0.2), MIRROR),
-        (volume(10, noise(6), v(0.35, 0.4, 0.0), 0.22), GLASS),
-    ];
-    things_in_dome(b, &things)
-}
-
-/// What loses no energy can't be seen in front of a white dome that shines everywhere.
-fn things_in_dome(b: &Backend, things: &[(Shape, Bsdf)]) -> Result<Vec<Measure>, Trouble> {
     let build = Build::new(v(0.0, 0.3, 0.9), v(0.0, 0.4, 0.0), 60.0)
         .add(sphere(DVec3::ZERO, 1.0), grey(1.0))
-        .add_all(things)
+        .add_all(&things)
         .light(DVec3::ZERO, DVec3::Y, 1.0, 1.0);
     let picture = b.picture_to(&build, &build.settings(), 3.3e-4)?;
     Ok(vec![
