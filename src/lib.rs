@@ -39,11 +39,12 @@ pub mod scene;
 
 pub use engine::{Counters, DeviceInfo};
 pub use files::FileError;
+pub use files::npy::Numbers;
 pub use film::coverage::Rect;
 pub use film::error::{Doubt, RelativeError};
 pub use film::{Estimate, Film};
 pub use glam::{DMat3, DVec3};
-pub use implicit::{Clip, Implicit, WrongFormula};
+pub use implicit::{Clip, Grid, Implicit, Volume, WrongFormula};
 pub use provenance::{DeviceUse, Provenance};
 pub use render::{
     Backend, CPU_TIME, DEFAULT_SPP, Error, MAX_SAMPLES, Options, Picture, Progress, Renderer,

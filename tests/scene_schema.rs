@@ -90,6 +90,22 @@ f = 'x'
 rotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 bounds = { radius = 3 }
 material = 'glass'
+[[isosurface]]
+file = 'scenes/density.npy'
+order = 'zyx'
+level = 1e4
+inside = 'above'
+origin = [-1, -1, -1]
+spacing = [0.05, 0.05, 0.05]
+rotation = { axis = [0, 1, 0], angle = 400 }
+closed = false
+material = 'gloss'
+[[isosurface]]
+file = 'scenes/density.npy'
+level = 2e4
+origin = [-1, -1, -1]
+spacing = [0.05, 0.05, 0.05]
+material = 'glass'
 [[light]]
 center = [0, 4, 0]
 normal = [0, -1, 0]
@@ -148,6 +164,7 @@ fn valid(schema: &Value, value: &Value) -> bool {
                 .is_none_or(|a| a.iter().any(|v| valid(rule, v))),
             "not" => !valid(rule, value),
             "const" => value == rule || (rule.is_number() && value.as_f64() == rule.as_f64()),
+            "enum" => rule.as_array().expect("a list").contains(value),
             "minimum" => value.as_f64() >= rule.as_f64(),
             "maximum" => value.as_f64() <= rule.as_f64(),
             "exclusiveMinimum" => value.as_f64() > rule.as_f64(),

@@ -164,17 +164,17 @@ Examples:
       writes particles.toml, and the atoms to particles.xyz
   etendue make-scene lights --count 100 -o hall.toml")]
 pub struct MakeSceneArgs {
-    /// Which objects the scene has many of
+    /// Which objects the scene has many of, or a volume
     #[arg(value_enum)]
     pub kind: SceneKind,
-    /// How many of them
+    /// How many of them; of a volume, the points along each side, 8 to 1024
     #[arg(long, value_name = "N", value_parser = values::whole::<u32>(1, 5_000_000), allow_hyphen_values = true)]
     pub count: u32,
     /// Seed of the generator: each gives a different scene of the same kind
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = values::seed(), allow_hyphen_values = true)]
     pub seed: u32,
     #[arg(help = format!("Scene file to write [default: the kind's name and .toml]. More than {MOST_IN_TABLES} objects go to a \
-                          .csv file beside it, and particles to an .xyz file"))]
+                          .csv file beside it, particles to an .xyz file, and a volume to an .npy file"))]
     /// `--output`.
     #[arg(short, long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
@@ -235,6 +235,8 @@ pub enum SceneKind {
     Particles,
     /// Lamps in a hall of columns.
     Lights,
+    /// Isosurfaces of a volume.
+    Volume,
 }
 
 /// `--progress`.

@@ -185,6 +185,7 @@ fn open_device(adapter: &wgpu::Adapter) -> Result<(wgpu::Device, wgpu::Queue), S
     let has = adapter.limits();
     let limits = wgpu::Limits {
         max_texture_dimension_2d: has.max_texture_dimension_2d,
+        max_texture_dimension_3d: has.max_texture_dimension_3d,
         max_buffer_size: has.max_buffer_size,
         max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
         ..wgpu::Limits::default()

@@ -6,7 +6,7 @@ use super::light_paths::{self, LightTracer};
 use super::pack::pack;
 use super::tile::{self, Tile};
 use super::work::{Work, coprime_stride, workgroups};
-use super::{Choice, Gpu, GpuError, scene};
+use super::{Choice, Gpu, GpuError, scene, volumes};
 use crate::engine::{Counters, DeviceInfo, Engine, EngineError, Part};
 use crate::film::Film;
 use crate::film::coverage::Rect;
@@ -146,7 +146,9 @@ impl GpuEngine {
         tell(Making::Packing);
         let packed = pack(world, kernel.access);
         let device = &gpu.device;
-        if let Some(problem) = scene::too_large(&packed, world.surface_count(), &device.limits()) {
+        let limits = device.limits();
+        let problem = scene::too_large(&packed, world.surface_count(), &limits);
+        if let Some(problem) = problem.or_else(|| volumes::too_large(world, &limits)) {
             return Err(unable(problem));
         }
         let oom = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
@@ -154,7 +156,7 @@ impl GpuEngine {
         tell(Making::Compiling);
         // SAFETY: without runtime checks the kernel must not index out of bounds or loop for ever. All its
         // indices are numbers of surfaces, materials and lights that `pack` wrote into buffers of just that
-        // length, or pixels that it compares with the tile's size first; its loops run over constant
+        // length, cells of a volume that it clamps to its size, or pixels that it compares with the tile's size first; its loops run over constant
         // ranges, over samples, each at most max_depth vertices and some glances long, or along nodes whose
         // next ones come later in a fixed order of the tree.
         let module = unsafe {
@@ -171,7 +173,7 @@ impl GpuEngine {
             return Err(GpuError::Kernel(error.to_string()));
         }
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let scene_layout = scene::layout(device, kernel.access);
+        let scene_layout = scene::layout(device, kernel.access, Some(world));
         let film_layout = tile::layout(device);
         let bound = kernel.light.as_ref().filter(|l| l.aims_bound);
         let aims_layout = bound.map(|_| light_paths::aims_layout(device));
@@ -190,7 +192,7 @@ impl GpuEngine {
             compilation_options: Default::default(),
             cache: None,
         });
-        let scene = scene::bind(&gpu, &scene_layout, &packed);
+        let scene = scene::bind(&gpu, &scene_layout, &packed, world);
         let aims = (aims_layout.zip(bound))
             .map(|(layout, light)| light_paths::bind_aims(&gpu, &layout, world, light));
         // SAFETY: it belongs to the path kernel.

@@ -12,6 +12,7 @@ pub mod probe;
 mod same_hits;
 mod scene;
 mod tile;
+mod volumes;
 mod work;
 
 pub use adapters::{AdapterReport, Choice, Gpu, adapters};

@@ -61,13 +61,26 @@ impl Probe {
     /// # Errors
     /// When the module is refused.
     pub fn compile(gpu: &Gpu, source: &str, access: Option<Access>) -> Result<Self, String> {
+        Self::compile_for(gpu, source, access, None)
+    }
+
+    /// The same for a source that reads the volumes of `world` too.
+    ///
+    /// # Errors
+    /// When the module is refused.
+    pub fn compile_for(
+        gpu: &Gpu,
+        source: &str,
+        access: Option<Access>,
+        world: Option<&World>,
+    ) -> Result<Self, String> {
         let device = &gpu.device;
         let invalid = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("probe"),
             source: wgpu::ShaderSource::Wgsl(source.into()),
         });
-        let scene = access.map(|access| (scene::layout(device, access), access));
+        let scene = access.map(|access| (scene::layout(device, access, world), access));
         let values = values_layout(device);
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("probe"),
@@ -129,8 +142,10 @@ impl Probe {
                 resource: b.as_entire_binding(),
             }),
         });
-        let scene = (self.scene.as_ref().zip(world))
-            .map(|((layout, access), world)| scene::bind(gpu, layout, &pack(world, *access)));
+        let scene = (self.scene.as_ref().zip(world)).map(|((layout, access), world)| {
+            let packed = pack(world, *access);
+            scene::bind(gpu, layout, &packed, world)
+        });
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());

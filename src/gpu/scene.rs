@@ -2,13 +2,19 @@
 
 use super::Gpu;
 use super::pack::Packed;
+use super::volumes;
 use crate::kernel::Access;
 use crate::kernel::records::RECORDS_A_ROW;
 use crate::kernel::trees::{MAX_UNITS, UNIT};
+use crate::world::World;
 use wgpu::util::DeviceExt as _;
 
-/// What is only read: nothing; surfaces, materials and lights; or records.
-pub(super) fn layout(device: &wgpu::Device, access: Access) -> wgpu::BindGroupLayout {
+/// What is only read: nothing; surfaces, materials and lights; or records. And the volumes of `world`.
+pub(super) fn layout(
+    device: &wgpu::Device,
+    access: Access,
+    world: Option<&World>,
+) -> wgpu::BindGroupLayout {
     let buffer = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Storage { read_only: true },
         has_dynamic_offset: false,
@@ -24,7 +30,7 @@ pub(super) fn layout(device: &wgpu::Device, access: Access) -> wgpu::BindGroupLa
         Access::Buffers => &[buffer; 3],
         Access::Tree => &[texture],
     };
-    let entries: Vec<_> = (0..)
+    let mut entries: Vec<_> = (0..)
         .zip(bound)
         .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
             binding,
@@ -33,21 +39,29 @@ pub(super) fn layout(device: &wgpu::Device, access: Access) -> wgpu::BindGroupLa
             count: None,
         })
         .collect();
+    entries.extend(world.into_iter().flat_map(volumes::entries));
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("scene"),
         entries: &entries,
     })
 }
 
-/// Makes buffers or texture, and binds them.
-pub(super) fn bind(gpu: &Gpu, layout: &wgpu::BindGroupLayout, packed: &Packed) -> wgpu::BindGroup {
+/// Makes buffers or textures, and binds them.
+pub(super) fn bind(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    packed: &Packed,
+    world: &World,
+) -> wgpu::BindGroup {
+    let volumes = volumes::textures(gpu, world);
     let group = |resources: &[wgpu::BindingResource]| {
         let numbered = (0..).zip(resources);
+        let views = volumes.iter();
+        let views = views.map(|(binding, v)| (*binding, wgpu::BindingResource::TextureView(v)));
         let entries: Vec<_> = numbered
-            .map(|(binding, resource)| wgpu::BindGroupEntry {
-                binding,
-                resource: resource.clone(),
-            })
+            .map(|(binding, resource)| (binding, resource.clone()))
+            .chain(views)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("scene"),

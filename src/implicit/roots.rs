@@ -1,10 +1,11 @@
 //! Where a ray meets an implicit surface, in f64: by bisection, with intervals of the function and of its derivative along the ray.
 //!
-//! The kernels do it in another way, which `shaders/shape/implicit.wgsl` describes.
+//! The kernels do it in another way, which `shaders/implicit/surface.wgsl` and `grid.wgsl` describe. A volume is met cell by cell here:
+//! all that the ray passes, without any hierarchy.
 
-use super::Implicit;
 use super::arithmetic::Arithmetic as _;
 use super::interval::{Interval, Varying};
+use super::{Implicit, grid};
 use glam::DVec3;
 
 /// The part of a closed surface that its formula makes.
@@ -33,6 +34,8 @@ pub struct Start {
 /// The function along a ray in its own space.
 struct Along<'a> {
     implicit: &'a Implicit,
+    /// The cell of a volume in which the ray is.
+    cell: Option<grid::Along>,
     q: DVec3,
     w: DVec3,
     /// 1 if the ray starts where the function is positive, or -1: it looks for a place where the sign changes.
@@ -52,8 +55,14 @@ impl Along<'_> {
             let slope = Varying::number(self.w[k]);
             t.multiply(slope).add(Varying::number(self.q[k]))
         };
-        let value = self.implicit.formula().evaluate([at(0), at(1), at(2)]);
-        let height = value.subtract(Varying::number(self.implicit.level));
+        let height = match (self.implicit.formula(), &self.cell) {
+            (Some(formula), _) => {
+                let value = formula.evaluate([at(0), at(1), at(2)]);
+                value.subtract(Varying::number(self.implicit.level))
+            }
+            (None, Some(cell)) => cell.over(t),
+            (None, None) => unreachable!("a volume is met cell by cell"),
+        };
         if self.sign < 0.0 {
             height.negate()
         } else {
@@ -63,12 +72,24 @@ impl Along<'_> {
 
     /// The function at a place, times the sign.
     fn at(&self, t: f64) -> f64 {
-        self.sign * self.implicit.height(self.q + self.w * t)
+        match &self.cell {
+            Some(_) => {
+                let Interval { low, high } = self.over(t, t).value;
+                0.5 * (low + high)
+            }
+            None => self.sign * self.implicit.height(self.q + self.w * t),
+        }
     }
 
     /// Its derivative.
     fn slope(&self, t: f64) -> f64 {
-        self.sign * self.implicit.sloped(self.q + self.w * t).1.dot(self.w)
+        match &self.cell {
+            Some(_) => {
+                let Interval { low, high } = self.over(t, t).slope;
+                0.5 * (low + high)
+            }
+            None => self.sign * self.implicit.sloped(self.q + self.w * t).1.dot(self.w),
+        }
     }
 
     /// The root between `low`, where the function is positive, and `high`, where it is negative and has fallen all the way.
@@ -84,8 +105,62 @@ impl Along<'_> {
         0.5 * (low + high)
     }
 
-    /// The first place from `low` to `high` at which the function is not positive any more.
-    fn first(&self, low: f64, high: f64) -> Option<f64> {
+    /// The first place from `low` to `high` at which the function is not positive any more. A ray that stands `on` a root at `low` does
+    /// not meet that one.
+    fn first(&mut self, low: f64, high: f64, mut on: bool) -> Option<f64> {
+        let Some(grid) = self.implicit.grid() else {
+            let low = if on {
+                self.beyond_start(low, high)
+            } else {
+                low
+            };
+            return self.first_of_part(low, high);
+        };
+        // Every cell that the ray passes, one after the other.
+        let (start, step) = (grid.in_cells(self.q), grid.in_cells(self.w));
+        let mut at = grid.volume.cell_at(start + step * low);
+        let mut from = low;
+        loop {
+            let leave = |k: usize| {
+                let side = at[k] as f64 + if step[k] > 0.0 { 1.0 } else { 0.0 };
+                let t = (side - start[k]) / step[k];
+                if step[k] == 0.0 { f64::INFINITY } else { t }
+            };
+            let axis = if leave(0) <= leave(1) && leave(0) <= leave(2) {
+                0
+            } else if leave(1) <= leave(2) {
+                1
+            } else {
+                2
+            };
+            let to = leave(axis).clamp(from, high);
+            let heights = grid.heights_of(at, self.implicit.level);
+            // The function lies between the values at the corners.
+            if on || !heights.0.iter().all(|h| self.sign * h > 0.0) {
+                self.cell = Some(grid::Along::new(&heights, start - grid::corner(at), step));
+                if on {
+                    from = self.beyond_start(from, to);
+                    // The whole cell may be too short to leave the root behind.
+                    on = from >= to && self.at(to) <= 0.0;
+                }
+                if !on && let Some(t) = self.first_of_part(from, to) {
+                    return Some(t);
+                }
+            }
+            let next = if step[axis] > 0.0 {
+                at[axis] + 1
+            } else {
+                at[axis].wrapping_sub(1)
+            };
+            if to >= high || next >= grid.volume.cells()[axis] {
+                return None;
+            }
+            (at[axis], from) = (next, to);
+        }
+    }
+
+    /// The same within a part of the ray on which the function is smooth.
+    fn first_of_part(&self, low: f64, high: f64) -> Option<f64> {
         let mut parts = vec![(low, high)];
         let mut left = MOST_PARTS;
         while let Some((low, high)) = parts.pop() {
@@ -120,16 +195,21 @@ impl Along<'_> {
         None
     }
 
-    /// How far from a root at 0 there is certainly no other, at most `end`.
-    fn beyond_start(&self, end: f64) -> f64 {
-        let mut t = end;
-        while t > self.finest {
-            if self.over(0.0, t).slope.low > 0.0 {
-                return t;
+    /// How far from a root at `start` there is certainly no other, at most `end`.
+    fn beyond_start(&self, start: f64, end: f64) -> f64 {
+        let mut reach = end - start;
+        while reach > self.finest {
+            if self.over(start, start + reach).slope.low > 0.0 {
+                // Not a rounding less than the end.
+                return if reach == end - start {
+                    end
+                } else {
+                    start + reach
+                };
             }
-            t *= 0.5;
+            reach *= 0.5;
         }
-        t
+        start + reach.max(0.0)
     }
 }
 
@@ -138,37 +218,35 @@ impl Implicit {
     pub fn meet(&self, o: DVec3, d: DVec3, start: Start) -> Option<(f64, usize)> {
         let (q, w) = (self.to_local(o), self.turned_back(d));
         let span = self.clip.span(q, w);
-        let along = |sign: f64| Along {
-            implicit: self,
-            q,
-            w,
-            sign,
-            finest: FINEST * self.ball().1,
-        };
         // The first root of a ray that stands on one, or on none.
-        let first = |along: Along, from: f64, to: f64| {
-            let from = if start.on == Some(SURFACE) && from == 0.0 {
-                along.beyond_start(to)
-            } else {
-                from
+        let first = |sign: f64, from: f64, to: f64, on: bool| {
+            let mut along = Along {
+                implicit: self,
+                cell: None,
+                q,
+                w,
+                sign,
+                finest: FINEST * self.ball().1,
             };
-            along.first(from, to)
+            along.first(from, to, on)
         };
+        let on_root = |from: f64| start.on == Some(SURFACE) && from == 0.0;
         if self.closed && start.inside {
             let leave = span.map_or(0.0, |s| s[1].max(0.0));
-            let root = first(along(-1.0), 0.0, leave);
+            let root = first(-1.0, 0.0, leave, on_root(0.0));
             return Some(root.map_or((leave, CAP), |t| (t, SURFACE)));
         }
         let [enter, leave] = span.filter(|s| s[1] > 0.0)?;
         let from = enter.max(0.0);
         if !self.closed {
-            let at = along(1.0);
-            let value = if start.on == Some(SURFACE) && from == 0.0 {
-                at.slope(0.0)
+            let (height, gradient) = self.sloped(q + w * from);
+            let value = if on_root(from) {
+                gradient.dot(w)
             } else {
-                at.at(from)
+                height
             };
-            let root = first(along(if value < 0.0 { -1.0 } else { 1.0 }), from, leave);
+            let sign = if value < 0.0 { -1.0 } else { 1.0 };
+            let root = first(sign, from, leave, on_root(from));
             return root.map(|t| (t, SURFACE));
         }
         if start.on == Some(CAP) {
@@ -189,12 +267,10 @@ impl Implicit {
                 if gradient.dot(w) < 0.0 {
                     return Some((0.0, SURFACE));
                 }
-                let at = along(1.0);
-                let root = at.first(at.beyond_start(leave), leave);
-                return root.map(|t| (t, SURFACE));
+                return first(1.0, 0.0, leave, true).map(|t| (t, SURFACE));
             }
         }
-        first(along(1.0), from, leave).map(|t| (t, SURFACE))
+        first(1.0, from, leave, on_root(from)).map(|t| (t, SURFACE))
     }
 
     /// `p` moved onto part `part` of the surface, and the unit normal there: outward of the solid, or to where the function is greater.

@@ -1,9 +1,9 @@
-//! An implicit surface in a scene: a formula, where it is looked at, and where that part of it stands.
+//! An implicit surface in a scene: a function, where it is looked at, and where that part of it stands.
 
-use super::Formula;
 use super::arithmetic::{Arithmetic as _, Sloped};
 use super::interval::Interval;
 use super::parse::{self, WrongFormula};
+use super::{Formula, Grid};
 use glam::{DMat3, DVec3};
 
 /// The part of its own space in which a surface is looked for.
@@ -122,15 +122,27 @@ pub(crate) enum DiskPlace {
     Cut,
 }
 
-/// The points at which a formula has a certain value, within a box or ball: the border of the points at which it has less.
+/// What has a certain value on a surface.
+#[derive(Debug, Clone, PartialEq)]
+enum Function {
+    /// A formula, as it was written, with its parameters.
+    Formula {
+        text: String,
+        parameters: Vec<(String, f64)>,
+        formula: Formula,
+    },
+    /// The trilinear function between the numbers of a volume.
+    Grid(Grid),
+}
+
+/// The points at which a function has a certain value, within a box or ball: the border of the points at which it has less, or, of a
+/// volume, more.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Implicit {
-    text: String,
-    parameters: Vec<(String, f64)>,
-    formula: Formula,
+    function: Function,
     /// The value.
     pub level: f64,
-    /// Where the origin of the formula's space lies.
+    /// Where the origin of the function's space lies.
     pub center: DVec3,
     /// The length of its unit, above 0.
     pub scale: f64,
@@ -154,10 +166,13 @@ impl Implicit {
     }
 
     pub(crate) fn of(text: String, parameters: Vec<(String, f64)>) -> Result<Self, WrongFormula> {
+        let formula = parse::parse(&text, &parameters)?;
         Ok(Self {
-            formula: parse::parse(&text, &parameters)?,
-            text,
-            parameters,
+            function: Function::Formula {
+                text,
+                parameters,
+                formula,
+            },
             level: 0.0,
             center: DVec3::ZERO,
             scale: 1.0,
@@ -167,34 +182,79 @@ impl Implicit {
         })
     }
 
+    /// The surface on which the trilinear function between the numbers of a volume has the value `level`.
+    pub fn of_volume(grid: Grid, level: f64) -> Self {
+        Self {
+            level,
+            center: DVec3::ZERO,
+            scale: 1.0,
+            rotation: DMat3::IDENTITY,
+            clip: Clip::Box {
+                min: DVec3::ZERO,
+                max: grid.extent(),
+            },
+            closed: true,
+            function: Function::Grid(grid),
+        }
+    }
+
     /// Whether a parameter may have this name.
     pub fn may_name(name: &str) -> bool {
         parse::may_name(name)
     }
 
-    /// The formula as it was written.
+    /// The formula as it was written; nothing if it is a volume's surface.
     pub fn text(&self) -> &str {
-        &self.text
+        match &self.function {
+            Function::Formula { text, .. } => text,
+            Function::Grid(_) => "",
+        }
     }
 
-    /// Its parameters.
+    /// The formula's parameters.
     pub fn parameters(&self) -> &[(String, f64)] {
-        &self.parameters
+        match &self.function {
+            Function::Formula { parameters, .. } => parameters,
+            Function::Grid(_) => &[],
+        }
     }
 
-    /// The formula.
-    pub fn formula(&self) -> &Formula {
-        &self.formula
+    /// The formula, if it is one's surface.
+    pub fn formula(&self) -> Option<&Formula> {
+        match &self.function {
+            Function::Formula { formula, .. } => Some(formula),
+            Function::Grid(_) => None,
+        }
+    }
+
+    /// The volume, if it is one's surface.
+    pub fn grid(&self) -> Option<&Grid> {
+        match &self.function {
+            Function::Formula { .. } => None,
+            Function::Grid(grid) => Some(grid),
+        }
     }
 
     /// Numbers that say all of it but how it was written.
     pub(crate) fn words(&self) -> Vec<u64> {
-        let mut words = vec![u64::from(self.closed), u64::from(self.formula.result())];
-        for node in self.formula.nodes() {
-            let (kind, a, b) = node.key();
-            words.extend([u64::from(kind), a, b]);
-        }
+        let mut words = vec![u64::from(self.closed)];
         let mut numbers = vec![self.level, self.scale];
+        match &self.function {
+            Function::Formula { formula, .. } => {
+                words.push(u64::from(formula.result()));
+                for node in formula.nodes() {
+                    let (kind, a, b) = node.key();
+                    words.extend([u64::from(kind), a, b]);
+                }
+            }
+            Function::Grid(grid) => {
+                words.push(u64::from(grid.above));
+                let digest = grid.volume.digest();
+                let (eights, _) = digest.as_chunks();
+                words.extend(eights.iter().map(|b| u64::from_le_bytes(*b)));
+                numbers.extend(grid.spacing.to_array());
+            }
+        }
         numbers.extend(self.center.to_array());
         numbers.extend(self.rotation.to_cols_array());
         match self.clip {
@@ -208,30 +268,38 @@ impl Implicit {
         words
     }
 
-    /// `p` in the formula's space.
+    /// `p` in the function's space.
     pub fn to_local(&self, p: DVec3) -> DVec3 {
         self.turned_back(p - self.center)
     }
 
-    /// A direction or a difference in the formula's space.
+    /// A direction or a difference in the function's space.
     pub fn turned_back(&self, v: DVec3) -> DVec3 {
         self.rotation.transpose() * v / self.scale
     }
 
-    /// A point of the formula's space.
+    /// A point of the function's space.
     pub fn to_world(&self, q: DVec3) -> DVec3 {
         self.center + self.rotation * (q * self.scale)
     }
 
-    /// The formula minus the level at a point of its space.
+    /// The function minus the level at a point of its space. Of a volume it has the sign that a solid wants, and is at most 1.
     pub fn height(&self, q: DVec3) -> f64 {
-        self.formula.evaluate(q.to_array()) - self.level
+        match &self.function {
+            Function::Formula { formula, .. } => formula.evaluate(q.to_array()) - self.level,
+            Function::Grid(grid) => grid.sloped(q, self.level).0,
+        }
     }
 
     /// The same with its gradient there.
     pub fn sloped(&self, q: DVec3) -> (f64, DVec3) {
-        let Sloped { value, gradient } = self.formula.evaluate(Sloped::coordinates(q));
-        (value - self.level, gradient)
+        match &self.function {
+            Function::Formula { formula, .. } => {
+                let Sloped { value, gradient } = formula.evaluate(Sloped::coordinates(q));
+                (value - self.level, gradient)
+            }
+            Function::Grid(grid) => grid.sloped(q, self.level),
+        }
     }
 
     /// What [`height`](Self::height) may be within `reach` of `q`, axis by axis.
@@ -240,8 +308,13 @@ impl Implicit {
             let low = (q[k] - reach[k]).next_down();
             Interval::new(low, (q[k] + reach[k]).next_up())
         };
-        let value = self.formula.evaluate([at(0), at(1), at(2)]);
-        value.subtract(Interval::number(self.level))
+        match &self.function {
+            Function::Formula { formula, .. } => {
+                let value = formula.evaluate([at(0), at(1), at(2)]);
+                value.subtract(Interval::number(self.level))
+            }
+            Function::Grid(grid) => grid.heights(q, reach, self.level),
+        }
     }
 
     /// Whether `p` is in the solid.
@@ -334,7 +407,7 @@ impl Implicit {
     }
 }
 
-/// A disk in a formula's space: its centre, and two radii.
+/// A disk in a function's space: its centre, and two radii.
 struct Patch {
     center: DVec3,
     x: DVec3,

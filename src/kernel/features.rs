@@ -93,6 +93,10 @@ pub(super) struct Features {
     pub access: Access,
     materials: BTreeSet<MaterialKind>,
     shapes: BTreeSet<ShapeKind>,
+    /// There are implicit surfaces of formulas.
+    pub has_formulas: bool,
+    /// There are those of volumes.
+    pub has_volumes: bool,
     lit_caps: bool,
     extreme_lights: bool,
     /// Lights are sampled.
@@ -135,6 +139,13 @@ impl Features {
         };
         let materials: BTreeSet<MaterialKind> = used().map(|b| b.kind()).collect();
         let shapes = world.primitives.iter().map(|p| ShapeKind::of(&p.geometry));
+        let implicit = || {
+            let all = world.primitives.iter();
+            all.filter_map(|p| match &p.geometry {
+                Geometry::Implicit(implicit) => Some(implicit),
+                _ => None,
+            })
+        };
         let lit = |p: &WorldPrimitive| {
             let caps = matches!(p.geometry, Geometry::Cylinder { .. }).then_some(&p.faces[1..]);
             let mut faces = caps.into_iter().flatten();
@@ -154,6 +165,8 @@ impl Features {
         Self {
             access,
             shapes: shapes.collect(),
+            has_formulas: implicit().any(|s| s.grid().is_none()),
+            has_volumes: implicit().any(|s| s.grid().is_some()),
             lit_caps: world.primitives.iter().any(lit),
             extreme_lights: world
                 .lights
@@ -181,6 +194,8 @@ impl Features {
             access: Access::Baked,
             materials: MaterialKind::ALL.into_iter().collect(),
             shapes: ShapeKind::FIXED.into_iter().collect(),
+            has_formulas: false,
+            has_volumes: false,
             lit_caps: false,
             extreme_lights: false,
             light_sampling: probe.glossy,

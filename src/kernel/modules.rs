@@ -42,6 +42,8 @@ modules! {
     HUGE_SPHERE = "shape/huge_sphere",
     IMPLICIT_AFFINE = "implicit/affine",
     IMPLICIT_BOUNDS = "implicit/bounds",
+    IMPLICIT_CELLS = "implicit/cells",
+    IMPLICIT_GRID = "implicit/grid",
     IMPLICIT_SURFACE = "implicit/surface",
     BUFFERS = "fetch/buffers",
     RECORDS = "fetch/records",
@@ -198,7 +200,9 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
             .map(|s| s.1),
     );
     if f.has_implicit() {
-        modules.extend([IMPLICIT_AFFINE, IMPLICIT_BOUNDS]);
+        modules.extend(f.has_formulas.then_some(IMPLICIT_AFFINE));
+        modules.push(IMPLICIT_BOUNDS);
+        modules.extend(f.has_volumes.then_some(IMPLICIT_CELLS));
         if f.access != Access::Tree {
             modules.push(TRIPS_LEFT);
         }

@@ -6,6 +6,7 @@
 //!
 //! Sources: PKWARE APPNOTE.TXT 6.3.10, sections 4.3.7 to 4.3.16 and 4.5.3; NumPy NEP 1 (format 1.0).
 
+use crate::files::npy;
 use std::io::{self, Read, Write};
 
 // Numbers are copied as they lie in memory, and stand in the file with the lowest byte first.
@@ -68,7 +69,7 @@ pub fn write(mut to: impl Write, arrays: &[Array]) -> io::Result<()> {
     let mut members = Vec::new();
     let mut offset = 0;
     for array in arrays {
-        let npy = npy_header(&array.descr, &array.shape);
+        let npy = npy::header(&array.descr, &array.shape);
         let mut crc = crc32fast::Hasher::new();
         crc.update(&npy);
         crc.update(array.data);
@@ -114,8 +115,8 @@ impl<R: Read> Reader<R> {
         let mut data = self.allocate::<u8>(size)?;
         self.from.read_exact(&mut data)?;
         // The header is padded: its length is the same for any number of digits.
-        let length = size.saturating_sub(npy_header("|S1", &[]).len() as u64);
-        let npy = npy_header(&format!("|S{length}"), &[]);
+        let length = size.saturating_sub(npy::header("|S1", &[]).len() as u64);
+        let npy = npy::header(&format!("|S{length}"), &[]);
         if !data.starts_with(&npy) {
             return Err(Damage::Wrong(format!("\"{name}\" is not a string")));
         }
@@ -134,7 +135,7 @@ impl<R: Read> Reader<R> {
         items: u64,
     ) -> Result<Vec<T>, Damage> {
         let (crc32, size) = self.local(name)?;
-        let expected = npy_header(descr, shape);
+        let expected = npy::header(descr, shape);
         let bytes = items.saturating_mul(size_of::<T>() as u64);
         let header = expected.len() as u64;
         let numbers = || {
@@ -265,25 +266,6 @@ fn check_crc(name: &str, expected: u32, parts: &[&[u8]]) -> Result<(), Damage> {
             "the content of \"{name}\" does not match its checksum"
         )))
     }
-}
-
-/// Header of a `.npy` file of format 1.0, padded to 64 bytes as NumPy pads it.
-fn npy_header(descr: &str, shape: &[u64]) -> Vec<u8> {
-    let shape = match shape {
-        [one] => format!("({one},)"),
-        many => {
-            let all: Vec<String> = many.iter().map(u64::to_string).collect();
-            format!("({})", all.join(", "))
-        }
-    };
-    let dict = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
-    let total = (10 + dict.len() + 1).next_multiple_of(64);
-    let mut header = b"\x93NUMPY\x01\x00".to_vec();
-    header.extend(((total - 10) as u16).to_le_bytes());
-    header.extend(dict.bytes());
-    header.resize(total - 1, b' ');
-    header.push(b'\n');
-    header
 }
 
 /// Local file header (4.3.7) of `NAME.npy`, the ZIP64 field (4.5.3) included.

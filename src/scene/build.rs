@@ -1,13 +1,12 @@
 //! Scenes built in code. They are written as a scene file and read like one: every rule of the format holds for them too.
 
-use super::implicit;
-use super::parse::parse_str;
+use super::parse::parse_with_volumes;
 use super::source::quoted;
 use super::{Bsdf, Camera, Diagnostic, Light, Parameter, Place, Scene, Shape};
-use crate::implicit::Implicit;
+use super::{implicit, isosurface};
+use crate::implicit::{Implicit, Volume};
 use glam::DVec3;
 use std::fmt::Write as _;
-use std::path::Path;
 use std::sync::Arc;
 
 /// How far the length of a unit vector may be from 1: a few roundings of f64.
@@ -39,6 +38,8 @@ pub struct SceneBuilder {
     up: Option<DVec3>,
     /// Each table: what messages call it, and its text.
     tables: Vec<(String, String)>,
+    /// The volumes that tables name.
+    volumes: Vec<(String, Arc<Volume>)>,
     /// Tables of each kind so far.
     counts: Vec<(&'static str, usize)>,
 }
@@ -181,6 +182,20 @@ impl SceneBuilder {
         self.shape(&Shape::Implicit(Arc::new(implicit.clone())), material)
     }
 
+    /// Where a volume has a certain value, or the solid that it bounds.
+    ///
+    /// ```
+    /// # use etendue::{Grid, Implicit, Numbers, Volume};
+    /// let squares = (0..27).map(|i| [i % 3, i / 3 % 3, i / 9].map(|k| (k - 1) * (k - 1)).iter().sum::<i32>() as u8);
+    /// let volume = Volume::new([3; 3], Numbers::U8(squares.collect()))?;
+    /// let grid = Grid { above: false, ..Grid::new(volume, [0.5; 3]) };
+    /// let scene = etendue::Scene::builder().isosurface(&Implicit::of_volume(grid, 0.9), "jade");
+    /// # Ok::<(), String>(())
+    /// ```
+    pub fn isosurface(self, isosurface: &Implicit, material: &str) -> Self {
+        self.implicit(isosurface, material)
+    }
+
     /// A disk that emits `radiance`, linear RGB, on the side that `normal` points to; `normal` has any length.
     pub fn light(
         self,
@@ -255,7 +270,7 @@ impl SceneBuilder {
         Ok(b)
     }
 
-    fn shape(self, shape: &Shape, material: &str) -> Self {
+    fn shape(mut self, shape: &Shape, material: &str) -> Self {
         let text = match *shape {
             Shape::Sphere { center, radius } => {
                 keys(&[("center", center)]) + &key("radius", radius)
@@ -269,7 +284,24 @@ impl SceneBuilder {
             Shape::Cylinder { base, top, radius } => {
                 keys(&[("base", base), ("top", top)]) + &key("radius", radius)
             }
-            Shape::Implicit(ref implicit) => implicit::text(implicit, string),
+            Shape::Implicit(ref implicit) => match implicit.grid() {
+                Some(grid) => {
+                    let mut grid = grid.clone();
+                    // Another volume may have the same name.
+                    let taken = |name: &str| {
+                        let known = self.volumes.iter().find(|v| v.0 == name);
+                        known.is_some_and(|v| v.1 != grid.volume)
+                    };
+                    let numbered = (2..).map(|n| format!("{} {n}", grid.file));
+                    let mut names = std::iter::once(grid.file.clone()).chain(numbered);
+                    if let Some(free) = names.find(|name| !taken(name)) {
+                        grid.file = free;
+                    }
+                    self.volumes.push((grid.file.clone(), grid.volume.clone()));
+                    isosurface::text(implicit, &grid, string)
+                }
+                None => implicit::text(implicit, string),
+            },
         };
         let text = format!("{text}material = {}\n", string(material));
         self.table(shape.kind(), text)
@@ -311,7 +343,7 @@ impl SceneBuilder {
 
     fn read(&self) -> Result<Scene, Vec<Diagnostic>> {
         let (text, lines) = self.text();
-        let mut scene = parse_str(Path::new(""), &text).map_err(|all| {
+        let mut scene = parse_with_volumes(&text, &self.volumes).map_err(|all| {
             let named = all.into_iter().map(|d| {
                 let table = lines.partition_point(|&first| first <= d.line);
                 let what = match table.checked_sub(1) {
@@ -400,7 +432,9 @@ fn string(text: &str) -> String {
 mod tests {
     use super::*;
     use crate::provenance::hash::scene_hash;
+    use crate::scene::parse::parse_str;
     use crate::settings::{Overrides, Settings};
+    use std::path::Path;
 
     fn room() -> SceneBuilder {
         Scene::builder()

@@ -1,7 +1,6 @@
 //! Defines what each table of a scene file contains. The parser uses these definitions to read a file, and the schema uses
 //! them to list the keys.
 
-use super::implicit;
 use super::rows::{ColorMap, Keys, Map, RowKind, Species, SpeciesLook, is_xyz};
 use super::source::quoted;
 use super::value::{
@@ -9,7 +8,10 @@ use super::value::{
     Share, Text, Value, normalized,
 };
 use super::{Camera, DEFAULT_MAX_DEPTH, DEFAULT_STRATA, Light, Place, RenderHints, Shape};
+use super::{implicit, isosurface};
+use crate::implicit::{AxisOrder, Volume};
 use glam::DVec3;
+use std::sync::Arc;
 
 /// Whether a key may be left out.
 pub(super) enum Need<T> {
@@ -55,6 +57,9 @@ pub(super) trait Table {
         key: &'static str,
         about: &'static str,
     ) -> Found<Vec<(String, T)>>;
+
+    /// The volume in the file `name`, a path relative to the scene file; none when it was wrong.
+    fn volume(&mut self, name: &str, order: AxisOrder) -> Option<Arc<Volume>>;
 
     /// Reports that the value of `key` breaks a rule that concerns more than it alone.
     fn refuse(&mut self, key: &str, message: String);
@@ -185,16 +190,18 @@ pub(super) enum ShapeKind {
     Disk,
     Cylinder,
     Implicit,
+    Isosurface,
 }
 
 impl ShapeKind {
     /// In the order of [`Scene::primitives`](super::Scene::primitives).
-    pub(super) const ALL: [Self; 5] = [
+    pub(super) const ALL: [Self; 6] = [
         Self::Sphere,
         Self::Plane,
         Self::Disk,
         Self::Cylinder,
         Self::Implicit,
+        Self::Isosurface,
     ];
 
     pub(super) fn name(self) -> &'static str {
@@ -204,6 +211,7 @@ impl ShapeKind {
             Self::Disk => "disk",
             Self::Cylinder => "cylinder",
             Self::Implicit => "implicit",
+            Self::Isosurface => "isosurface",
         }
     }
 
@@ -219,11 +227,15 @@ impl ShapeKind {
                 "Where a formula has a certain value: the surface of the solid where it has less, or a surface without a solid, \
                  which must not be dielectric."
             }
+            Self::Isosurface => {
+                "Where a volume has a certain value: the surface of the solid where it has more, or a surface without a solid, which \
+                 must not be dielectric."
+            }
         }
     }
 }
 
-/// `[[sphere]]`, `[[plane]]`, `[[disk]]` or `[[cylinder]]`, and the name of its material.
+/// A table of a shape, and the name of its material.
 pub(super) fn primitive(t: &mut impl Table, kind: ShapeKind) -> Option<(Shape, String)> {
     let shape = match kind {
         ShapeKind::Sphere => sphere(t),
@@ -231,6 +243,7 @@ pub(super) fn primitive(t: &mut impl Table, kind: ShapeKind) -> Option<(Shape, S
         ShapeKind::Disk => disk(t),
         ShapeKind::Cylinder => cylinder(t),
         ShapeKind::Implicit => implicit::read(t),
+        ShapeKind::Isosurface => isosurface::read(t),
     };
     let material = t.required::<Text>("material", "NAME of a [material.NAME].");
     Some((shape?, material?.0))

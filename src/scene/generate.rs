@@ -1,5 +1,9 @@
-//! Generates scenes with many objects: spheres placed like the seeds of a sunflower, a cloud of spheres, a cluster of atoms, and a
-//! hall of lamps.
+//! Generates scenes with many objects: spheres placed like the seeds of a sunflower, a cloud of spheres, a cluster of atoms, a
+//! hall of lamps; and a volume.
+
+mod volume;
+
+pub use volume::{SIDES, volume};
 
 use super::parse::parse_with_rows;
 use super::{Diagnostic, Scene};
@@ -21,6 +25,8 @@ pub struct Generated {
     pub scene: String,
     /// Rows of a CSV file, or of an extended XYZ file.
     pub rows: Option<String>,
+    /// A NumPy file with a volume, if it has one.
+    pub volume: Option<Vec<u8>>,
 }
 
 impl Generated {
@@ -260,6 +266,7 @@ species.Cu = {{ radius = {radius:.6}, reflectance = [0.45, 0.6, 0.75] }}
     Generated {
         scene,
         rows: Some(text),
+        volume: None,
     }
 }
 
@@ -381,6 +388,7 @@ impl List {
         Generated {
             scene: std::mem::take(scene),
             rows: self.rows.then_some(self.text),
+            volume: None,
         }
     }
 }

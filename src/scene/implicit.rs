@@ -23,7 +23,7 @@ struct Bounds(Clip);
 
 /// A rotation: an axis and an angle, or a matrix.
 #[derive(Debug, Clone, Copy)]
-struct Rotation(DMat3);
+pub(super) struct Rotation(pub(super) DMat3);
 
 /// Names and numbers.
 #[derive(Debug, Clone)]
@@ -223,40 +223,51 @@ pub(super) fn read(t: &mut impl Table) -> Option<Shape> {
     Some(Shape::Implicit(Arc::new(implicit)))
 }
 
+/// A number that reads back to the same bits.
+pub(super) fn number_text(x: f64) -> String {
+    if x.is_nan() {
+        "nan".into()
+    } else {
+        format!("{x:?}")
+    }
+}
+
+pub(super) fn vector_text(v: DVec3) -> String {
+    let [x, y, z] = v.to_array().map(number_text);
+    format!("[{x}, {y}, {z}]")
+}
+
+pub(super) fn rotation_text(rotation: DMat3) -> String {
+    let rows = rotation.transpose();
+    let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(vector_text);
+    format!("[{}]", rows.join(", "))
+}
+
 /// The keys of an implicit surface, as they stand in a file. `string` writes a string.
 pub(super) fn text(implicit: &Implicit, string: impl Fn(&str) -> String) -> String {
-    let number = |x: f64| {
-        if x.is_nan() {
-            "nan".into()
-        } else {
-            format!("{x:?}")
-        }
-    };
-    let vector = |v: DVec3| {
-        let [x, y, z] = v.to_array().map(number);
-        format!("[{x}, {y}, {z}]")
-    };
     let mut s = format!("f = {}\n", string(implicit.text()));
     if !implicit.parameters().is_empty() {
         let all = implicit.parameters().iter();
         let all: Vec<String> = all
-            .map(|(name, x)| format!("{} = {}", string(name), number(*x)))
+            .map(|(name, x)| format!("{} = {}", string(name), number_text(*x)))
             .collect();
         let _ = writeln!(s, "parameters = {{ {} }}", all.join(", "));
     }
-    let rows = implicit.rotation.transpose();
-    let rows = [rows.x_axis, rows.y_axis, rows.z_axis].map(vector);
     let bounds = match implicit.clip {
-        Clip::Box { min, max } => format!("{{ min = {}, max = {} }}", vector(min), vector(max)),
-        Clip::Ball { radius } => format!("{{ radius = {} }}", number(radius)),
+        Clip::Box { min, max } => format!(
+            "{{ min = {}, max = {} }}",
+            vector_text(min),
+            vector_text(max)
+        ),
+        Clip::Ball { radius } => format!("{{ radius = {} }}", number_text(radius)),
     };
     let _ = write!(
         s,
-        "level = {}\ncenter = {}\nscale = {}\nrotation = [{}]\nbounds = {bounds}\nclosed = {}\n",
-        number(implicit.level),
-        vector(implicit.center),
-        number(implicit.scale),
-        rows.join(", "),
+        "level = {}\ncenter = {}\nscale = {}\nrotation = {}\nbounds = {bounds}\nclosed = {}\n",
+        number_text(implicit.level),
+        vector_text(implicit.center),
+        number_text(implicit.scale),
+        rotation_text(implicit.rotation),
         implicit.closed
     );
     s

@@ -9,6 +9,7 @@ mod format;
 #[doc(hidden)]
 pub mod generate;
 mod implicit;
+mod isosurface;
 mod material;
 mod order;
 pub mod parse;
@@ -46,7 +47,7 @@ pub const DEFAULT_STRATA: u32 = 2;
 pub struct Scene {
     /// Where it was read from; empty for scenes made in memory.
     pub path: PathBuf,
-    /// The files of rows that it names.
+    /// The other files that it names: those of rows, and volumes.
     pub row_files: Vec<PathBuf>,
     /// `title`, if the file has one.
     pub title: Option<String>,
@@ -56,7 +57,7 @@ pub struct Scene {
     pub render: RenderHints,
     /// Materials in the order of their names, those of colours in rows last.
     pub materials: Vec<Material>,
-    /// Primitives in the order spheres, planes, disks, cylinders, implicit surfaces, each in file order, those from files of rows after the others.
+    /// Primitives in the order spheres, planes, disks, cylinders, formulas, volumes, each in file order, those from files of rows after the others.
     pub primitives: Vec<Primitive>,
     /// Disk lights in file order, those from files of rows last; at least one.
     pub lights: Vec<Light>,
@@ -165,7 +166,7 @@ pub enum Shape {
         top: DVec3,
         radius: f64,
     },
-    /// Where a formula has a certain value.
+    /// Where a formula, or a volume, has a certain value.
     Implicit(Arc<Implicit>),
 }
 
@@ -202,6 +203,7 @@ impl Shape {
             Shape::Plane { .. } => "plane",
             Shape::Disk { .. } => "disk",
             Shape::Cylinder { .. } => "cylinder",
+            Shape::Implicit(implicit) if implicit.grid().is_some() => "isosurface",
             Shape::Implicit(_) => "implicit",
         }
     }

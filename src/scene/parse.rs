@@ -10,16 +10,21 @@ use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Sc
 use super::{rows, schema, syntax};
 use crate::files::kind::FileKind;
 use crate::files::reason;
+use crate::implicit::Volume;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
 
 /// The largest scene file that is read, in bytes; that is half a million spheres or more.
 pub const MAX_FILE_BYTES: u64 = 64 << 20;
 
-/// The most implicit surfaces of a scene.
+/// The most formulas of a scene.
 pub const MAX_FORMULAS: usize = 64;
+
+/// The most isosurfaces of a scene: each takes two of the 16 textures that every device allows.
+pub const MAX_VOLUMES: usize = 8;
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -125,6 +130,14 @@ pub(super) fn parse_with_rows(
     parse(Source::new(path, text).with_rows(rows))
 }
 
+/// The same with volumes that are in memory, by the names that `text` has for them.
+pub(super) fn parse_with_volumes(
+    text: &str,
+    volumes: &[(String, Arc<Volume>)],
+) -> Result<Scene, Vec<Diagnostic>> {
+    parse(Source::new(Path::new(""), text).with_volumes(volumes))
+}
+
 fn parse(source: Source) -> Result<Scene, Vec<Diagnostic>> {
     let mut faults = Faults::new();
     let scene =
@@ -139,7 +152,7 @@ fn parse(source: Source) -> Result<Scene, Vec<Diagnostic>> {
 fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> {
     if root.is_empty() {
         let message = "is empty; a scene needs [camera], a [[light]], and a \
-                       [[sphere]], [[plane]], [[disk]], [[cylinder]] or [[implicit]]";
+                       [[sphere]], [[plane]], [[disk]], [[cylinder]], [[implicit]] or [[isosurface]]";
         faults.push(None, message.into());
         return None;
     }
@@ -205,10 +218,10 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
     })
 }
 
-/// The files of rows that the scene names.
+/// The files of rows and the volumes that the scene names.
 fn row_files(source: &Source, root: &DeTable) -> Vec<PathBuf> {
     let tables = |key: &str| root.get(key).and_then(|v| v.get_ref().as_array());
-    let all = ["spheres", "cylinders", "lights"]
+    let all = ["spheres", "cylinders", "lights", "isosurface"]
         .into_iter()
         .filter_map(tables);
     let names = all
@@ -294,7 +307,7 @@ fn primitives(
             {
                 let message = format!(
                     "material {} is dielectric, but {what} is not solid; \
-                     dielectrics are allowed on spheres, cylinders, planes and closed implicit surfaces",
+                     dielectrics are allowed on spheres, cylinders, planes and closed implicit surfaces and isosurfaces",
                     quoted(&name)
                 );
                 t.refuse("material", message);
@@ -310,7 +323,9 @@ fn primitives(
         let rows = match kind {
             ShapeKind::Sphere => RowKind::Sphere,
             ShapeKind::Cylinder => RowKind::Cylinder,
-            ShapeKind::Plane | ShapeKind::Disk | ShapeKind::Implicit => continue,
+            ShapeKind::Plane | ShapeKind::Disk | ShapeKind::Implicit | ShapeKind::Isosurface => {
+                continue;
+            }
         };
         for more in file.each(rows.table(), |t, place| {
             surfaces(t, place, rows, materials, palette)
@@ -321,19 +336,28 @@ fn primitives(
             }
         }
     }
-    let formulas = file.table.get("implicit");
-    let formulas = formulas.and_then(|v| v.get_ref().as_array());
-    if let Some(beyond) = formulas.and_then(|all| all.get(MAX_FORMULAS)) {
-        let message = format!(
-            "more than {MAX_FORMULAS} [[implicit]]; each becomes code of its own, so a scene has at most so many. One formula may \
-             describe several solids: min(f, g)"
-        );
-        file.faults.push(Some(beyond.span().start), message);
-    }
+    let mut at_most = |kind: ShapeKind, most: usize, why: &str| {
+        let name = kind.name();
+        let all = file.table.get(name).and_then(|v| v.get_ref().as_array());
+        if let Some(beyond) = all.and_then(|all| all.get(most)) {
+            let message = format!("more than {most} [[{name}]]; {why}");
+            file.faults.push(Some(beyond.span().start), message);
+        }
+    };
+    at_most(
+        ShapeKind::Implicit,
+        MAX_FORMULAS,
+        "each becomes code of its own, so a scene has at most so many. One formula may describe several solids: min(f, g)",
+    );
+    at_most(
+        ShapeKind::Isosurface,
+        MAX_VOLUMES,
+        "each is a texture of its own, of which devices allow so many",
+    );
     let wrong = ShapeKind::ALL.iter().any(|kind| file.is_wrong(kind.name()));
     if primitives.is_empty() && !wrong {
         let message = "no primitive; a scene needs at least one \
-                       [[sphere]], [[plane]], [[disk]], [[cylinder]] or [[implicit]]";
+                       [[sphere]], [[plane]], [[disk]], [[cylinder]], [[implicit]] or [[isosurface]]";
         file.faults.push(None, message.into());
     }
     primitives

@@ -1,12 +1,15 @@
 //! Reads the tables of a scene file key by key, and reports missing, invalid and unknown keys with their place.
 
 use super::format::{Found, Inner, Need, Table};
+use super::isosurface::NoVolume;
 use super::source::{Faults, Source, quoted, shorten, suggestion};
 use super::value::{Text, Value};
 use super::{Bsdf, MaterialKind, Place, rows, schema};
+use crate::implicit::{AxisOrder, Volume};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -100,6 +103,23 @@ impl Table for Reader<'_, '_> {
             Found::Value(tables)
         } else {
             Found::Wrong
+        }
+    }
+
+    fn volume(&mut self, name: &str, order: AxisOrder) -> Option<Arc<Volume>> {
+        let path = self.source.beside(name);
+        match self.source.volume(name, order) {
+            Ok(volume) => Some(volume),
+            Err(NoVolume::Unreadable(why)) => {
+                let place = self.place_of("file");
+                let message = format!("cannot read {}: {why}", path.display());
+                self.faults.push_unreadable(place, message);
+                None
+            }
+            Err(NoVolume::Wrong(why)) => {
+                self.refuse("file", format!("{}: {why}", path.display()));
+                None
+            }
         }
     }
 

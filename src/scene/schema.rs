@@ -4,7 +4,9 @@ use super::format::{self, Found, Inner, Need, ShapeKind, Table};
 use super::rows::RowKind;
 use super::value::{Text, Value};
 use super::{MaterialKind, Place};
+use crate::implicit::{AxisOrder, Volume};
 use serde_json::{Map, Value as Json, json};
+use std::sync::Arc;
 
 /// The description of `title`.
 pub(super) const TITLE: &str = "Title of the picture.";
@@ -143,6 +145,10 @@ impl Table for Description {
         let all = json!({"description": about, "type": "object", "additionalProperties": each, "minProperties": 1});
         self.properties.insert(key.into(), all);
         Found::Absent
+    }
+
+    fn volume(&mut self, _: &str, _: AxisOrder) -> Option<Arc<Volume>> {
+        None
     }
 
     fn refuse(&mut self, _: &str, _: String) {}

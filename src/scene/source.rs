@@ -1,13 +1,20 @@
 //! Places in the text of a scene file: converts byte offsets to lines, columns and short quotes.
 
+use super::isosurface::{self, NoVolume};
 use super::{Diagnostic, Place};
+use crate::implicit::{AxisOrder, Volume};
+use std::cell::RefCell;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The most errors reported for one file; the rest are counted.
 const MAX_ERRORS: usize = 50;
 /// The most characters of the file quoted in a message.
 const MAX_QUOTE: usize = 40;
+
+/// A volume by the name of its file, and the order of axes in which it was read. What was in memory before stands for any.
+type Known = (String, Option<AxisOrder>, Arc<Volume>);
 
 /// The text of a file.
 pub(super) struct Source<'a> {
@@ -17,6 +24,8 @@ pub(super) struct Source<'a> {
     lines: Vec<usize>,
     /// The text of the CSV file that the scene names, if it is in memory.
     rows: Option<&'a str>,
+    /// Volumes that are in memory, by the names of their files: those that were there before, and those that have been read.
+    volumes: RefCell<Vec<Known>>,
 }
 
 impl<'a> Source<'a> {
@@ -29,6 +38,7 @@ impl<'a> Source<'a> {
                 .chain(starts.map(|(i, _)| i + 1))
                 .collect(),
             rows: None,
+            volumes: RefCell::default(),
         }
     }
 
@@ -40,6 +50,27 @@ impl<'a> Source<'a> {
     /// The text of the file of rows, if it is in memory.
     pub(super) fn rows(&self) -> Option<&'a str> {
         self.rows
+    }
+
+    /// The same with volumes that are in memory, by the names that the text has for them.
+    pub(super) fn with_volumes(self, volumes: &[(String, Arc<Volume>)]) -> Self {
+        let known = volumes.iter();
+        let known = known.map(|(name, v)| (name.clone(), None, v.clone()));
+        let volumes = RefCell::new(known.collect());
+        Self { volumes, ..self }
+    }
+
+    /// The volume in the file that the text calls `name`. It is read once.
+    pub(super) fn volume(&self, name: &str, order: AxisOrder) -> Result<Arc<Volume>, NoVolume> {
+        let known =
+            |(n, o, v): &Known| (n == name && o.is_none_or(|o| o == order)).then(|| v.clone());
+        if let Some(volume) = self.volumes.borrow().iter().find_map(known) {
+            return Ok(volume);
+        }
+        let volume = Arc::new(isosurface::load(&self.beside(name), order)?);
+        let entry = (name.to_owned(), Some(order), volume.clone());
+        self.volumes.borrow_mut().push(entry);
+        Ok(volume)
     }
 
     pub(super) fn path(&self) -> &'a Path {

@@ -274,6 +274,8 @@ numbers! {
 numbers! {
     /// A position.
     Point: three of COORDINATE;
+    /// Lengths along three axes.
+    Lengths: three of LENGTH;
     /// A share of the light, red, green and blue.
     Share: three of SHARE;
     /// An emitted radiance, red, green and blue.

@@ -188,7 +188,8 @@ impl<'a> Range<'a> {
         let probe = match probes.get(&source) {
             Some(probe) => probe.clone(),
             None => {
-                let probe = Probe::compile(&open.gpu, &source, Some(self.access))
+                let (gpu, world) = (&open.gpu, Some(self.world()));
+                let probe = Probe::compile_for(gpu, &source, Some(self.access), world)
                     .map_err(Trouble::Device)?;
                 probes.entry(source).or_insert(Arc::new(probe)).clone()
             }

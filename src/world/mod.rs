@@ -136,7 +136,7 @@ pub struct World {
     pub materials: Vec<Bsdf>,
     /// Lights that some ray can meet. A ray meets a light before anything that coincides with it.
     pub lights: Vec<WorldLight>,
-    /// Primitives that some ray can meet: disks, cylinders, planes, spheres, then implicit surfaces. Each kind is in the order of
+    /// Primitives that some ray can meet: disks, cylinders, planes, spheres, then formulas and volumes. Each kind is in the order of
     /// [`Canonical`]. Of primitives that coincide, a ray meets the first.
     pub primitives: Vec<WorldPrimitive>,
     /// Index of refraction of every medium, relative to air: first of air, then of the solids.
@@ -162,7 +162,14 @@ impl World {
         let origin = scene_origin / unit;
         let eye = scene.camera.eye - origin;
         let mut primitives: Vec<WorldPrimitive> = Vec::with_capacity(scene.primitives.len());
-        for kind in ["disk", "cylinder", "plane", "sphere", "implicit"] {
+        for kind in [
+            "disk",
+            "cylinder",
+            "plane",
+            "sphere",
+            "implicit",
+            "isosurface",
+        ] {
             for p in scene.primitives.iter().filter(|p| p.shape.kind() == kind) {
                 primitives.push(WorldPrimitive {
                     geometry: Geometry::new(&p.shape, origin),

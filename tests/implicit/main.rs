@@ -1,10 +1,11 @@
-//! Implicit surfaces: what the kernels meet against the f64 reference, which finds roots in another way, and against surfaces that
+//! Implicit surfaces, of formulas and of volumes: what the kernels meet against the f64 reference, which finds roots in another way, and against surfaces that
 //! have a form of their own.
 
 #[path = "../common/mod.rs"]
 mod common;
 mod pictures;
 mod rays;
+mod volumes;
 
 /// Formulas with the text of their bounds, each for another reason: a quartic, a surface with cusps, one with many double points, a
 /// periodic sheet, sums of exponentials, a body with edges, quotients and roots.

@@ -37,7 +37,7 @@ fn vec(x: &[f32]) -> DVec3 {
 
 /// What a batch of rays has shown.
 #[derive(Debug, Default)]
-struct Report {
+pub struct Report {
     rays: usize,
     /// Rays that were left out because they may or may not meet the surface on which they stand.
     at_once: usize,
@@ -73,7 +73,27 @@ fn the_surface(world: &World) -> (&WorldPrimitive, &Implicit) {
 }
 
 /// Rays from anywhere to anywhere near the surface, and rays that start on it.
-fn shoot(world: &World, count: usize, seed: u64) -> Report {
+pub fn shoot(world: &World, count: usize, seed: u64) -> Report {
+    let (inputs, outputs) = answers(world, count, seed);
+    let mut report = Report::default();
+    for (x, y) in inputs.iter().zip(&outputs) {
+        judge(world, x, y, &mut report);
+    }
+    report.turns /= count as f64;
+    report
+}
+
+/// Where such rays meet the surface.
+pub fn hits(world: &World, count: usize, seed: u64) -> Vec<DVec3> {
+    let first = 4.0 * world.lights.len() as f32;
+    let (_, outputs) = answers(world, count, seed);
+    let met = outputs.iter().filter(|y| y[1] >= first);
+    met.map(|y| (vec(&y[2..5]) + world.origin) * world.unit)
+        .collect()
+}
+
+/// Rays, and what the kernel says of them.
+fn answers(world: &World, count: usize, seed: u64) -> (Vec<Values>, Vec<Values>) {
     let (p, implicit) = the_surface(world);
     let (center, size) = implicit.ball();
     let mut r = Uniform(seed);
@@ -135,17 +155,12 @@ fn shoot(world: &World, count: usize, seed: u64) -> Report {
     let access = Access::Baked;
     let parsed = settings_of(world);
     let source = scene_probe_source(world, &parsed, access, BODY);
-    let probe =
-        Probe::compile(&GPU, &source, Some(access)).unwrap_or_else(|e| panic!("{e}\n{source}"));
+    let probe = Probe::compile_for(&GPU, &source, Some(access), Some(world))
+        .unwrap_or_else(|e| panic!("{e}\n{source}"));
     let outputs = probe
         .run(&GPU, Some(world), &inputs)
         .unwrap_or_else(|e| panic!("{e}"));
-    let mut report = Report::default();
-    for (x, y) in inputs.iter().zip(&outputs) {
-        judge(world, x, y, &mut report);
-    }
-    report.turns /= count as f64;
-    report
+    (inputs, outputs)
 }
 
 fn settings_of(world: &World) -> etendue::Settings {
@@ -275,6 +290,28 @@ fn near_edge(implicit: &Implicit, p: DVec3) -> bool {
     implicit.clip.depth(q).abs() < reach || around.any(|d| normal(q + d).dot(normal(q)) < 0.98)
 }
 
+/// What is wrong with the answers to `count` rays.
+pub fn failures_of(name: &str, report: &Report, count: usize) -> Option<String> {
+    println!(
+        "{name}: {} rays, {} hits, {} missed, {} ghosts, {} displaced, {} turned; {:.1} turns, at most {}",
+        report.rays,
+        report.hits,
+        report.missed,
+        report.ghosts,
+        report.displaced,
+        report.turned,
+        report.turns,
+        report.most_turns
+    );
+    if let Some(example) = &report.example {
+        println!("{example}");
+    }
+    assert!(report.hits > report.rays / 20, "{name}: {report:?}");
+    assert!(report.at_once < count / 50, "{name}: {report:?}");
+    let wrong = report.missed + report.ghosts + report.displaced + report.turned;
+    (wrong > 0).then(|| format!("{name}: {report:?}"))
+}
+
 /// Of each surface, as a solid seen from outside, a solid of glass, and a sheet.
 fn all(count: usize) {
     let mut failures = Vec::new();
@@ -291,22 +328,7 @@ fn all(count: usize) {
             let text = scene_of(formula, bounds, keys, "[0.3, 0.4, 50]");
             let world = World::new(&scene(&text), [8, 8]);
             let report = shoot(&world, count, 1 + count as u64);
-            println!(
-                "{name} {kind}: {} rays, {} hits, {} missed, {} ghosts, {} displaced, {} turned; {:.1} turns, at most {}",
-                report.rays,
-                report.hits,
-                report.missed,
-                report.ghosts,
-                report.displaced,
-                report.turned,
-                report.turns,
-                report.most_turns
-            );
-            assert!(report.hits > report.rays / 20, "{name}: {report:?}");
-            assert!(report.at_once < count / 50, "{name}: {report:?}");
-            if report.missed + report.ghosts + report.displaced + report.turned > 0 {
-                failures.push(format!("{name} {kind}: {report:?}"));
-            }
+            failures.extend(failures_of(&format!("{name} {kind}"), &report, count));
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));

@@ -2,6 +2,7 @@
 
 mod files;
 mod implicit;
+mod isosurface;
 mod reading;
 mod structure;
 mod values;

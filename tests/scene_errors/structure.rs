@@ -65,7 +65,7 @@ fn unknown_keys_and_names_get_suggestions() {
         "[[disk]]",
         "[[discs]]",
         "54:3: unknown key \"discs\" in the scene; allowed: title, camera, render, material, sphere, \
-         spheres, plane, disk, cylinder, cylinders, implicit, light, lights; did you mean \"disk\"?",
+         spheres, plane, disk, cylinder, cylinders, implicit, isosurface, light, lights; did you mean \"disk\"?",
     );
     one(
         "ior = 1.5",
@@ -113,7 +113,7 @@ fn missing_keys_and_tables() {
     );
     let bare = &FULL[..FULL.find("[[plane]]").expect("plane")];
     let no_primitive = [
-        "s.toml: no primitive; a scene needs at least one [[sphere]], [[plane]], [[disk]], [[cylinder]] or [[implicit]]",
+        "s.toml: no primitive; a scene needs at least one [[sphere]], [[plane]], [[disk]], [[cylinder]], [[implicit]] or [[isosurface]]",
     ];
     assert_eq!(parse(bare).expect_err("nothing there"), no_primitive);
     let empty_array = format!("sphere = []\n{bare}");
@@ -126,7 +126,7 @@ fn missing_keys_and_tables() {
             parse(empty).expect_err("empty"),
             [
                 "s.toml: is empty; a scene needs [camera], a [[light]], and a \
-              [[sphere]], [[plane]], [[disk]], [[cylinder]] or [[implicit]]"
+              [[sphere]], [[plane]], [[disk]], [[cylinder]], [[implicit]] or [[isosurface]]"
             ]
         );
     }

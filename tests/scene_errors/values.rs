@@ -264,7 +264,7 @@ fn rules_between_keys() {
         parse(&disk).expect_err("a glass disk"),
         [
             "s.toml:58:12: material \"glass\" is dielectric, but a disk is not solid; \
-          dielectrics are allowed on spheres, cylinders, planes and closed implicit surfaces"
+          dielectrics are allowed on spheres, cylinders, planes and closed implicit surfaces and isosurfaces"
         ]
     );
 }

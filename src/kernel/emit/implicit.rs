@@ -1,9 +1,10 @@
-//! Implicit surfaces: their formulas as code, and for each surface a function that meets it, and one that says where.
+//! Implicit surfaces: for each a function that meets it, and one that says where; and formulas as code.
 
 use super::super::features::Features;
 use super::super::literal::{float, vector};
 use super::super::modules::IMPLICIT_SURFACE;
 use super::super::preprocess::fill;
+use super::grid;
 use crate::implicit::formula::{Formula, Id, Node};
 use crate::implicit::{Clip, Implicit};
 use crate::world::{Geometry, Side, World, WorldPrimitive, key};
@@ -43,6 +44,13 @@ fn all(world: &World) -> impl Iterator<Item = (usize, &WorldPrimitive, &Implicit
         })
 }
 
+/// Those of volumes.
+pub(in crate::kernel) fn grids(
+    world: &World,
+) -> impl Iterator<Item = (usize, &WorldPrimitive, &Implicit)> {
+    all(world).filter(|(.., implicit)| implicit.grid().is_some())
+}
+
 /// The name of the function that meets surface number `number`.
 pub(super) fn name(number: usize) -> String {
     format!("implicit_{number}")
@@ -56,17 +64,23 @@ pub(in crate::kernel) fn generate(world: &World, features: &Features) -> String 
     }
     let mut written: Vec<(&Formula, f64)> = Vec::new();
     for (number, p, implicit) in all(world) {
-        let this = (implicit.formula(), implicit.level);
+        let Some(formula) = implicit.formula() else {
+            continue;
+        };
+        let this = (formula, implicit.level);
         let k = match written.iter().position(|f| *f == this) {
             Some(k) => k,
             None => {
                 written.push(this);
                 let k = written.len() - 1;
-                s.push_str(&formula(k, implicit));
+                s.push_str(&text_of(k, formula, implicit.level));
                 k
             }
         };
         s.push_str(&surface(number, p, implicit, k));
+    }
+    for (k, (number, p, implicit)) in grids(world).enumerate() {
+        s.push_str(&grid::surface(k, number, p, implicit));
     }
     s.push_str(
         "fn implicit_vertex(key: u32, p: vec3f, d: vec3f) -> Vertex {\n    var v: Vertex;\n",
@@ -82,10 +96,10 @@ pub(in crate::kernel) fn generate(world: &World, features: &Features) -> String 
 }
 
 /// Formula number `k`, in both arithmetics.
-fn formula(k: usize, implicit: &Implicit) -> String {
-    let nodes = implicit.formula().nodes();
-    let result = implicit.formula().result();
-    let level = number(-implicit.level);
+fn text_of(k: usize, formula: &Formula, level: f64) -> String {
+    let nodes = formula.nodes();
+    let result = formula.result();
+    let (is_zero, level) = (level == 0.0, number(-level));
     let mut s = format!("fn formula_{k}(q: vec3f, half: vec3f, slack: vec3f) -> vec3f {{\n");
     for (id, node) in nodes.iter().enumerate() {
         if let Some(value) = affine(nodes, node) {
@@ -96,7 +110,7 @@ fn formula(k: usize, implicit: &Implicit) -> String {
     let _ = writeln!(
         s,
         "    return {};\n}}\n",
-        if implicit.level == 0.0 {
+        if is_zero {
             value
         } else {
             format!("affine_shift({value}, {level})")
@@ -204,6 +218,51 @@ fn sloped(nodes: &[Node], node: &Node) -> Option<String> {
     })
 }
 
+/// What rays can meet a surface, and from where: what stands in the templates for it.
+pub(super) struct Sides {
+    pub solid: &'static str,
+    pub inside: String,
+    pub asked: String,
+    pub sign: &'static str,
+    pub result: String,
+}
+
+impl Sides {
+    pub fn of(number: usize, p: &WorldPrimitive, implicit: &Implicit) -> Self {
+        let (solid, inside, asked) = match (implicit.closed, p.side) {
+            (false, _) => ("false", "false".into(), "true".into()),
+            (true, Side::Outside) => ("true", "false".into(), "true".into()),
+            (true, Side::Inside) => ("true", "true".into(), "true".into()),
+            (true, Side::Both) => (
+                "true",
+                format!("ray.medium == {}u", p.solid),
+                format!("(inside || ray.medium == {}u)", p.parent),
+            ),
+        };
+        let sign = if implicit.closed {
+            "select(1.0, -1.0, inside)"
+        } else {
+            "select(1.0, -1.0, known)"
+        };
+        // What is left of the way inside ends at the bounds.
+        let result = if implicit.closed {
+            format!(
+                "nearer(surface, asked && inside && !met, finish, {}u)",
+                key(number, 0) + 1
+            )
+        } else {
+            "surface".into()
+        };
+        Self {
+            solid,
+            inside,
+            asked,
+            sign,
+            result,
+        }
+    }
+}
+
 /// The functions of one surface, whose formula has number `k`.
 fn surface(number: usize, p: &WorldPrimitive, implicit: &Implicit, k: usize) -> String {
     let name = name(number);
@@ -228,31 +287,8 @@ fn surface(number: usize, p: &WorldPrimitive, implicit: &Implicit, k: usize) -> 
     // Both ends of a part lie on the ray but for the rounding of its points.
     let slack = (middle.abs() + half) * f64::from(f32::EPSILON);
     let text = format!("formula_{k}");
-    let (solid, inside, asked) = match (implicit.closed, p.side) {
-        (false, _) => ("false", "false".into(), "true".into()),
-        (true, Side::Outside) => ("true", "false".into(), "true".into()),
-        (true, Side::Inside) => ("true", "true".into(), "true".into()),
-        (true, Side::Both) => (
-            "true",
-            format!("ray.medium == {}u", p.solid),
-            format!("(inside || ray.medium == {}u)", p.parent),
-        ),
-    };
-    let sign = if implicit.closed {
-        "select(1.0, -1.0, inside)"
-    } else {
-        "select(1.0, -1.0, known)"
-    };
+    let sides = Sides::of(number, p, implicit);
     let own = key(number, 0);
-    // What is left of the way inside ends at the bounds.
-    let result = if implicit.closed {
-        format!(
-            "nearer(surface, asked && inside && !met, finish, {}u)",
-            own + 1
-        )
-    } else {
-        "surface".into()
-    };
     let size = implicit.ball().1;
     let [least, tolerance, zone, first_step] =
         [LEAST, TOLERANCE, ZONE, FIRST_STEP].map(|share| float(share * size));
@@ -278,10 +314,10 @@ fn surface(number: usize, p: &WorldPrimitive, implicit: &Implicit, k: usize) -> 
             ("column_z", &columns[2]),
             ("span", &span),
             ("onto", &onto),
-            ("inside", &inside),
-            ("asked", &asked),
-            ("solid", solid),
-            ("sign", sign),
+            ("inside", &sides.inside),
+            ("asked", &sides.asked),
+            ("solid", sides.solid),
+            ("sign", sides.sign),
             ("key", &key),
             ("least", &least),
             ("tolerance", &tolerance),
@@ -290,7 +326,7 @@ fn surface(number: usize, p: &WorldPrimitive, implicit: &Implicit, k: usize) -> 
             ("most_turns", &most),
             ("newton", "2u"),
             ("reach", &reach),
-            ("result", &result),
+            ("result", &sides.result),
             ("slack", &vector(slack)),
         ],
     );

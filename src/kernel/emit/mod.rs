@@ -2,6 +2,7 @@
 //! materials.
 
 pub(super) mod fetch;
+pub(super) mod grid;
 pub(super) mod implicit;
 pub(super) mod lights;
 pub(super) mod materials;

@@ -1,4 +1,4 @@
-//! Formulas without a value somewhere, without a surface within their bounds, or with one that the bounds cut.
+//! Formulas without a value somewhere, and formulas and volumes without a surface within their bounds, or with one that the bounds cut.
 
 use super::geometry::directions;
 use super::{Warnings, called};
@@ -31,9 +31,31 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     let mut warnings = Warnings::default();
     for (p, implicit) in all(scene) {
         let name = || called(p.shape.kind(), p.line);
+        if let Some(grid) = implicit.grid() {
+            let [low, high] = grid.volume.range();
+            let level = implicit.level;
+            // What only touches the level has no inside.
+            if (low..=high).contains(&level) {
+                continue;
+            }
+            let what = match (level < low) == grid.above && implicit.closed {
+                true => "the solid is the whole of it",
+                false => "there is no surface",
+            };
+            warnings.add(p.place(), || {
+                format!(
+                    "the numbers of {} run from {low} to {high}, so its level {level} is never reached: {what}",
+                    name()
+                )
+            });
+            continue;
+        }
+        let Some(formula) = implicit.formula() else {
+            continue;
+        };
         let inside: Vec<DVec3> = grid(implicit).collect();
         let undefined = |q: &&DVec3| {
-            let value = implicit.formula().evaluate(q.to_array().map(Strict));
+            let value = formula.evaluate(q.to_array().map(Strict));
             !value.0.is_finite()
         };
         if let Some(q) = inside.iter().find(undefined) {
@@ -104,9 +126,11 @@ pub(super) fn cut(scene: &Scene) -> Warnings {
             let end = if implicit.closed { "closed" } else { "open" };
             warnings.add(p.place(), || {
                 format!(
-                    "the bounds of {} cut its surface, which is {end} there (at {:.1} % of the bounds the formula is below its level)",
+                    "the bounds of {} cut its surface, which is {end} there (at {:.1} % of the bounds the {} is {} its level)",
                     called(p.shape.kind(), p.line),
-                    100.0 * f64::from(below) / ON_BOUNDS as f64
+                    100.0 * f64::from(below) / ON_BOUNDS as f64,
+                    if implicit.grid().is_some() { "volume" } else { "formula" },
+                    if implicit.grid().is_some_and(|g| g.above) { "above" } else { "below" },
                 )
             });
         }
