@@ -4,9 +4,10 @@ mod output_support;
 
 use etendue::files::FileError;
 use etendue::film::coverage::Rect;
+use etendue::film::splats::SplatSetup;
 use etendue::film::{Film, REPLICATES};
 use etendue::output::pixels::Pixels;
-use etendue::output::store::{load, save};
+use etendue::output::store::{load, pixel_bytes, save};
 use etendue::provenance::Provenance;
 use output_support::{
     Random, described, forge, forge_bytes, negate_first_count, region_film, render,
@@ -126,6 +127,26 @@ fn numpy_sees_the_same() {
                 ])
             );
         }
+    }
+}
+
+/// What a disk is asked for before a run is what its film takes there.
+#[test]
+fn a_film_takes_no_more_room_than_is_foreseen() {
+    let dir = tempfile::tempdir().unwrap();
+    for light_paths in [false, true] {
+        let (size, rect) = ([64, 48], Rect::whole([64, 48]));
+        let mut film = Film::new(size, rect, 2);
+        if light_paths {
+            let (paths, scale) = (1, 1.0);
+            film.begin_splats(SplatSetup { paths, scale });
+        }
+        render(&mut film, rect, 0..300);
+        let (path, _) = saved(dir.path(), &film);
+        let bytes = fs::metadata(path).unwrap().len();
+        let foreseen = pixel_bytes(light_paths) * rect.area();
+        assert!(bytes < foreseen + 10_000, "{bytes} of {foreseen}");
+        assert!(bytes > foreseen / 2, "{bytes} of {foreseen}");
     }
 }
 

@@ -334,7 +334,9 @@ fn rows_with_colors_stand_for_materials_and_cylinders() {
     let both = text.replace("'atoms.csv'\n", "'atoms.csv'\nmaterial = 'white'\n");
     let errors = parse_str(&place, &both).expect_err("both");
     assert!(
-        errors[0].to_string().contains("unknown column \"r\""),
+        errors[0]
+            .to_string()
+            .contains("column \"r\" and the key material of the scene's table say the same"),
         "{}",
         errors[0]
     );

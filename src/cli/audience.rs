@@ -53,7 +53,8 @@ pub fn bind(address: &Address, quiet: bool) -> Result<Server, Failure> {
              127.0.0.1 is for this machine alone"
         );
     }
-    if !quiet {
+    // Nobody else knows which port was free.
+    if !quiet || address.port == 0 {
         say!("the page is at {}", server.url());
     }
     Ok(server)

@@ -15,6 +15,12 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
             Err(e) => {
                 let failure = Failure::from(e);
                 failure.print();
+                // Errors in a file of rows do not name the scene.
+                if let Failure::Scene(all) = &failure {
+                    let s = if all.len() == 1 { "" } else { "s" };
+                    let (path, n) = (path.display(), all.len());
+                    super::write_stdout(&format!("{path}: {n} error{s}\n"))?;
+                }
                 first_failure.get_or_insert(Failure::Said(failure.status()));
             }
         }

@@ -9,9 +9,10 @@ use super::layers;
 use super::progress::Progress;
 use crate::denoise::folder;
 use crate::files::FileError;
-use crate::layers::{NoScene, View};
+use crate::layers::{NoScene, View, check_scene};
 use crate::output::{Extra, Format, store};
 use crate::provenance::Provenance;
+use crate::scene::parse;
 use std::path::PathBuf;
 
 /// Writes the pictures that `render` would have written, and what a denoiser needs.
@@ -26,6 +27,10 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     let steps = 1 + outputs.len();
     progress.step(0, steps, &args.film.display().to_string());
     let (film, provenance) = store::load(&args.film)?;
+    if let Some(path) = &args.scene {
+        let why = |no: NoScene| FileError::content(path, no.to_string());
+        check_scene(&provenance, &parse::read(path)?).map_err(why)?;
+    }
 
     // What is made from the scene.
     let mut extra = Extra::default();
@@ -75,7 +80,9 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
             .iter()
             .map(|folder| format!("six halves and their features in {}", folder.display()));
         let list: Vec<String> = written.list().into_iter().chain(folds).collect();
-        progress.say(&format!("wrote {}", list.join(", ")));
+        if !list.is_empty() {
+            progress.say(&format!("wrote {}", list.join(", ")));
+        }
     }
     if let (Some(path), Some(made)) = (&args.report, &made) {
         write_text(path, &made.report().to_json())?;
@@ -104,7 +111,7 @@ fn check(args: &DevelopArgs) -> Result<Vec<PathBuf>, Failure> {
         }
         files.writes_text("--report", path)?;
     }
-    layers::check(&args.pictures, &outputs)?;
+    layers::check(&args.pictures, &outputs, None)?;
     if denoises {
         denoise::check(&args.pictures)?;
     }

@@ -14,8 +14,8 @@ pub fn export(args: &ExportArgs) -> Result<(), Failure> {
     files.reads("the scene", &args.scene)?;
     files.writes_text("--output", &args.output)?;
     let scene = parse::read(&args.scene)?;
-    for path in &scene.row_files {
-        files.reads("a table of the scene", path)?;
+    for file in &scene.row_files {
+        files.reads("a table of the scene", &file.path)?;
     }
     let target = match args.to {
         ExportTarget::Mitsuba => Target::Mitsuba,

@@ -92,11 +92,11 @@ fn check_files(args: &RegressArgs, cases: &[Case]) -> Result<(), Failure> {
         files.reads("the film of a failed scene", &case.actual_path())?;
         files.reads("the report of a failed scene", &case.report_path())?;
         // Errors in a scene are reported when its case runs.
-        for path in parse::read(&case.scene_path())
+        for file in parse::read(&case.scene_path())
             .iter()
             .flat_map(|s| &s.row_files)
         {
-            files.reads("a table of a scene", path)?;
+            files.reads("a table of a scene", &file.path)?;
         }
     }
     if let Some(path) = &args.html {

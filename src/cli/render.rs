@@ -13,11 +13,11 @@ use super::saver::{Saver, longest_call};
 use super::say;
 use super::signals::Signals;
 use super::stages::Stages;
-use super::{ending, plan};
+use super::{ending, plan, resume, room};
 use crate::engine::DeviceInfo;
 use crate::files::FileError;
+use crate::files::kind;
 use crate::files::lock::Lock;
-use crate::files::room;
 use crate::film::Film;
 use crate::film::REPLICATES;
 use crate::film::coverage::Rect;
@@ -42,9 +42,6 @@ use crate::world::World;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Bytes that a pixel may take in a picture: nine channels of four bytes, which compression seldom makes more of.
-const PICTURE_BYTES: u64 = 36;
-
 /// Seconds of rendering beside which a trial of each light is nothing.
 const TRIAL_PAYS: f64 = 5.0;
 
@@ -52,7 +49,8 @@ const TRIAL_PAYS: f64 = 5.0;
 pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     let begun = Instant::now();
 
-    // Check everything that can be checked before the first sample.
+    // Check everything that can be checked before the first sample. What is no scene comes first: its name may be that of a picture.
+    kind::check_text(&args.scene, "a scene")?;
     let outputs = with_denoised(&outputs(args), args.denoise.denoise)?;
     let files = check_files(args, &outputs)?;
     plan::check_flags(args.backend, args.adapter.as_deref())?;
@@ -89,20 +87,20 @@ fn render_before(
     stages.begin(format!("reading {}", args.scene.display()));
     let text = parse::read_text(&args.scene)?;
     let scene = parse::parse_str(&args.scene, &text).map_err(Failure::Scene)?;
-    for path in &scene.row_files {
-        files.reads("a table of the scene", path)?;
+    for file in &scene.row_files {
+        files.reads("a table of the scene", &file.path)?;
     }
     let _lock = args.film.as_deref().map(Lock::new).transpose()?;
     if let Some(path) = &args.film {
         stages.begin(format!("reading {}", path.display()));
     }
-    let old = load_film(args)?;
+    let old = resume::film(args)?;
     let args = &match &old {
         Some((film, _)) => plan::as_film(args, film)?,
         None => args.clone(),
     };
     let settings = match &old {
-        Some((_, held)) => resumed(args, &scene, held),
+        Some((_, held)) => resume::settings(args, &scene, held),
         None => Settings::resolve(&scene, &args.overrides()),
     };
     let regions = plan::regions(args, &settings)?;
@@ -121,7 +119,7 @@ fn render_before(
     })?;
     let (mut film, mut provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
-            check_same_samples(args, path, &held, &new)?;
+            resume::check_same_samples(args, path, &held, &new)?;
             plan::check_bounds(path, &film, bounds)?;
             plan::check_adaptive(args, path, &film, &regions)?;
             (film, held)
@@ -160,7 +158,7 @@ fn render_before(
     if film.coverage.is_empty() {
         provenance.settings.light_paths = light_paths.is_some();
     } else if film.splats().map(|s| s.setup) != light_paths {
-        return Err(other_light_paths(args, &film));
+        return Err(resume::other_light_paths(args, &film));
     }
     let time_is_default = args.time.is_none();
     let args = &plan::on_device(args, chosen.engine.device());
@@ -187,7 +185,7 @@ fn render_before(
     {
         say!("{note}");
     }
-    say_little_room(args, outputs, &film);
+    room::say_little(args, outputs, &film, light_paths.is_some());
     say_suspect(args, &scene, &settings, chosen.engine.device());
     if !args.talk.quiet {
         say_start(args, &settings, &chosen, &job, &film)?;
@@ -335,7 +333,7 @@ fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure>
     for path in outputs {
         Format::from_path(path).map_err(Failure::Input)?;
     }
-    layers::check(&args.pictures, outputs)?;
+    layers::check(&args.pictures, outputs, args.watch.as_deref())?;
     if args.denoise.denoise {
         denoise::check(&args.pictures)?;
     }
@@ -370,91 +368,6 @@ fn check_files(args: &RenderArgs, outputs: &[PathBuf]) -> Result<Files, Failure>
         files.writes_text("--report", path)?;
     }
     Ok(files)
-}
-
-/// The film to resume, if there is one.
-fn load_film(args: &RenderArgs) -> Result<Option<(Film, Provenance)>, Failure> {
-    match &args.film {
-        Some(path) if path.exists() => Ok(Some(store::load(path)?)),
-        _ => Ok(None),
-    }
-}
-
-/// The settings of a film that is resumed, but for what flags say, and for what the scene file has got since.
-fn resumed(args: &RenderArgs, scene: &Scene, held: &Provenance) -> Settings {
-    let before = parse::parse_str(&args.scene, &held.scene_text);
-    let changed = before.map_or(Changed::default(), |old| Changed::between(&old, scene));
-    let flags = args.overrides().or_held(&held.settings, &changed);
-    let settings = Settings::resolve(scene, &flags);
-    Settings {
-        max_depth_is_default: held.settings.max_depth_is_default && args.max_depth.is_none(),
-        ..settings
-    }
-}
-
-/// Refuses a film whose samples differ from those of this command, and says why and what to type.
-fn check_same_samples(
-    args: &RenderArgs,
-    path: &Path,
-    held: &Provenance,
-    new: &Provenance,
-) -> Result<(), Failure> {
-    held.same_samples(new).map_err(|differ| {
-        let flags = args.overrides();
-        let leave_out = flags.against(&held.settings);
-        let add = flags.to_add(&held.settings, &new.settings);
-        let mut advice = Vec::new();
-        if !leave_out.is_empty() {
-            advice.push(format!("leave out {}", leave_out.join(" and ")));
-        }
-        if !add.is_empty() {
-            advice.push(format!("add {}", add.join(" ")));
-        }
-        if advice.is_empty() {
-            advice.push("give the scene of the film".into());
-        }
-        let advice = format!("{}, or name another film", advice.join(" and "));
-        let message =
-            format!("this film can't be resumed; film and command line: {differ}; {advice}");
-        FileError::content(path, message).into()
-    })
-}
-
-/// A film that has light paths cannot be resumed without, and the other way round: samples leave out what light paths bring.
-fn other_light_paths(args: &RenderArgs, film: &Film) -> Failure {
-    let advice = match (film.splats(), args.backend) {
-        (Some(_), Backend::Gpu) => "it is not of this scene's light paths",
-        (Some(_), _) => {
-            "it has light paths, which the CPU reference does not trace; resume it with --backend gpu"
-        }
-        (None, _) => "it has no light paths; resume it with --light-paths off",
-    };
-    let path = args.film.clone().unwrap_or_default();
-    FileError::content(&path, format!("this film can't be resumed here: {advice}")).into()
-}
-
-/// A warning for every disk that has too little room for what is written to it at the end. Others may use it until then, and files are
-/// written beside those that they replace.
-fn say_little_room(args: &RenderArgs, outputs: &[PathBuf], film: &Film) {
-    let pixels = film.bounds.area();
-    let whole = u64::from(film.size[0]) * u64::from(film.size[1]);
-    let films = args
-        .film
-        .iter()
-        .map(|path| (path, pixels * store::pixel_bytes(film)));
-    let pictures = outputs.iter().map(|path| (path, whole * PICTURE_BYTES));
-    for (path, needed) in films.chain(pictures) {
-        // Devices take anything.
-        let is_file = std::fs::metadata(path).map_or(true, |m| m.is_file());
-        if let Some(free) = room::free(path).filter(|free| is_file && *free < needed) {
-            say!(
-                "warning: {}: there is room for {:.1} MB, and it may take {:.1} MB at the end",
-                path.display(),
-                free as f64 / 1e6,
-                needed as f64 / 1e6
-            );
-        }
-    }
 }
 
 /// What is suspect about the scene: in full where it changes the picture, by number where it does not.

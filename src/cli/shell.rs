@@ -29,7 +29,8 @@ pub fn man(args: &ManArgs) -> Result<(), Failure> {
             .next()
             .map_or(Ok(()), |page| write_stdout(&text(&page)));
     };
-    std::fs::create_dir_all(dir).map_err(|e| FileError::io(dir, "cannot create", &e))?;
+    std::fs::create_dir_all(dir)
+        .map_err(|e| FileError::io(dir, "no such folder, and it can't be made", &e))?;
     let mut count = 0;
     for page in pages {
         let text = text(&page);

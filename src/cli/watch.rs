@@ -5,6 +5,7 @@ use super::audience::{bind, serve};
 use super::failure::Failure;
 use super::say;
 use super::signals::Signals;
+use crate::files::atomic;
 use crate::output::store;
 use crate::watch::{Board, Files, MOST_FILMS};
 use std::sync::Arc;
@@ -23,12 +24,17 @@ const SHARE: u32 = 10;
 
 /// Serves the page until a signal comes.
 pub fn watch(args: &WatchArgs) -> Result<(), Failure> {
-    // A film that isn't there yet will come. One that can't be read is a mistake now, and a matter for the page later.
+    // A film that isn't there yet will come, to a folder that is there. One that can't be read is a mistake now, and a matter for the page
+    // later.
     for path in args.paths.iter().filter(|p| !p.is_dir()) {
         if path.exists() {
             store::outline(path)?;
-        } else if !args.quiet {
-            say!("note: {} does not exist yet", path.display());
+            continue;
+        }
+        atomic::check_folder(path)?;
+        if !args.quiet {
+            let path = path.display();
+            say!("note: {path} does not exist yet; waiting for a film of this name");
         }
     }
     let signals =

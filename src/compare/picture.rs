@@ -5,10 +5,11 @@ use crate::film::Film;
 use crate::output::store;
 use crate::output::{Kind, Pixels, entries, read_exr, read_image, read_png};
 use crate::provenance::Provenance;
+use std::fmt;
 use std::path::Path;
 
 /// A picture and its noise, if known.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Side {
     /// Where it is from, for messages.
     pub name: String,
@@ -25,7 +26,7 @@ pub struct Side {
 }
 
 /// The noise that a picture states.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Noise {
     /// Standard errors of R, G, B and of the luminance, row by row.
     pub error: Vec<[f64; 4]>,
@@ -37,6 +38,27 @@ pub struct Noise {
     pub unit: Unit,
     /// Independent replicates behind every error, at least 2.
     pub replicates: u32,
+}
+
+/// A short summary, without the pixels.
+impl fmt::Debug for Side {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Side")
+            .field("name", &self.name)
+            .field("size", &self.size)
+            .field("noise", &self.noise)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The same.
+impl fmt::Debug for Noise {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Noise")
+            .field("unit", &self.unit)
+            .field("replicates", &self.replicates)
+            .finish_non_exhaustive()
+    }
 }
 
 /// A measurement of a pixel.

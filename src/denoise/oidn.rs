@@ -55,18 +55,14 @@ impl Oidn {
             return Self::of(library, threads);
         };
         let files: Vec<PathBuf> = if named.is_dir() {
-            NAMES
-                .iter()
-                .map(|name| named.join(name))
-                .filter(|f| f.exists())
-                .collect()
+            below(&named)
         } else {
             vec![named.clone()]
         };
         let shown = named.display();
         let [file, ..] = &files[..] else {
             return Err(format!(
-                "{shown}: there is no library of Open Image Denoise in this folder"
+                "{shown}: there is no library of Open Image Denoise in this folder, nor in its lib, oidn/lib or {IN_PACKAGE}"
             ));
         };
         let library = open(file)
@@ -271,6 +267,16 @@ fn places() -> Vec<PathBuf> {
         .flat_map(|f| NAMES.iter().map(|name| f.join(name)));
     let of_loader = NAMES.iter().map(PathBuf::from);
     of_loader.chain(in_folders.filter(|f| f.exists())).collect()
+}
+
+/// The libraries in a folder: its own, those of an installation that has it as its root, and those of a Python package or of a folder of
+/// packages.
+fn below(folder: &Path) -> Vec<PathBuf> {
+    let folders = ["", "lib", "oidn/lib", IN_PACKAGE].map(|inner| folder.join(inner));
+    let files = folders
+        .iter()
+        .flat_map(|f| NAMES.iter().map(|name| f.join(name)));
+    files.filter(|f| f.exists()).collect()
 }
 
 /// The folders lib/python3* of an environment, the newest first.

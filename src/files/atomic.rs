@@ -34,6 +34,12 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
     attempt().map_err(|e| FileError::io(path, "cannot write", &e))
 }
 
+/// Refuses the path of a file that can't come to be there: its folder is not there either, or it names a folder.
+pub fn check_folder(path: &Path) -> Result<(), FileError> {
+    let found = target(path).map(drop);
+    found.map_err(|e| FileError::io(path, "cannot read", &e))
+}
+
 enum Target {
     /// An ordinary file, there or not, links followed.
     File(PathBuf),

@@ -172,6 +172,15 @@ pub fn explain(error: FileError, what: &str, wanted: Option<FileKind>) -> FileEr
     FileError::Content { path, message }
 }
 
+/// Refuses a file at `path` whose first bytes tell that it is no text, for one that should be `what`. A file that is not there, or no
+/// file, is for others to refuse.
+pub fn check_text(path: &Path, what: &str) -> Result<(), FileError> {
+    match start_of(path).and_then(|start| FileKind::of_no_text(&start)) {
+        Some(kind) => Err(FileError::content(path, format!("not {what} ({kind})"))),
+        None => Ok(()),
+    }
+}
+
 /// The first bytes of a file. Not of a pipe: it has given them away already, and opening it again may wait for ever.
 fn start_of(path: &Path) -> Option<Vec<u8>> {
     if !std::fs::metadata(path).ok()?.is_file() {

@@ -22,6 +22,7 @@ pub use left_out::LeftOut;
 use pilot::Pilot;
 use rayon::prelude::*;
 use splats::Splats;
+use std::fmt;
 use std::mem::take;
 use std::ops::Range;
 
@@ -35,7 +36,7 @@ pub const BLOCK: u64 = 256;
 pub type Sums<T> = [T; 4];
 
 /// Accumulated samples of a picture or of a part of it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct Film {
     /// Width and height of the whole picture in pixels.
     pub size: [u32; 2],
@@ -58,6 +59,20 @@ pub struct Film {
     /// How far paths of each pixel have got, as a [`Reach`], in the order of `sums`; 0 where they have met nothing. Empty if that is
     /// so everywhere, or if it is not known.
     reached: Vec<u8>,
+}
+
+/// A short summary: a film may hold millions of numbers.
+impl fmt::Debug for Film {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Film")
+            .field("size", &self.size)
+            .field("bounds", &self.bounds)
+            .field("strata", &self.strata)
+            .field("samples", &self.coverage.samples())
+            .field("adaptive", &self.pilot.is_some())
+            .field("light_paths", &self.splats.is_some())
+            .finish_non_exhaustive()
+    }
 }
 
 /// How far a path has got. A pixel without light whose paths have met nothing is a background. If they have met no second surface

@@ -62,11 +62,22 @@ pub(super) fn parse(text: &str, parameters: &[(String, f64)]) -> Result<Formula,
     match parser.peek() {
         None => Ok(parser.graph.formula(result)),
         Some(')') => Err(parser.wrong("this bracket closes nothing")),
-        Some(c) => Err(parser.wrong(&format!(
-            "{c:?} is not expected here; allowed: + - * / ^, a name, or a bracket"
-        ))),
+        Some(c) => Err(parser.unexpected(c)),
     }
 }
+
+/// Functions that others know by these names, and what stands for them here.
+const OTHERS: [(&str, &str); 7] = [
+    ("pow", POWERS),
+    ("sqr", POWERS),
+    ("square", POWERS),
+    ("cube", POWERS),
+    ("ln", "; the natural logarithm is log"),
+    ("length", "; distances are written sqrt(x^2 + y^2 + z^2)"),
+    ("fabs", "; the absolute value is abs"),
+];
+
+const POWERS: &str = "; powers are written x^2";
 
 struct Parser<'a> {
     text: &'a str,
@@ -98,6 +109,20 @@ impl Parser<'_> {
             }
             _ => false,
         }
+    }
+
+    /// The error of a character after a whole expression.
+    fn unexpected(&self, c: char) -> WrongFormula {
+        let hint = match c {
+            '²' | '³' | '⁴' => POWERS,
+            '=' | '<' | '>' => {
+                "; move everything to one side: the surface is where the formula is 0"
+            }
+            _ => "",
+        };
+        self.wrong(&format!(
+            "{c:?} is not expected here; allowed: + - * / ^, a name, or a bracket{hint}"
+        ))
     }
 
     fn wrong(&self, message: &str) -> WrongFormula {
@@ -218,9 +243,13 @@ impl Parser<'_> {
             Some('(') => self.bracket(),
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if starts_name(c) => self.name(),
-            Some(c) => Err(self.wrong(&format!(
-                "{c:?} is not expected here; expected a number, a name, or a bracket"
-            ))),
+            Some(c) => {
+                let twice = c == '*' && self.text[..self.at].ends_with('*');
+                let hint = if twice { POWERS } else { "" };
+                Err(self.wrong(&format!(
+                    "{c:?} is not expected here; expected a number, a name, or a bracket{hint}"
+                )))
+            }
             None => {
                 Err(self
                     .wrong("the formula ends where a number, a name, or a bracket should follow"))
@@ -243,9 +272,7 @@ impl Parser<'_> {
         }
         match self.peek() {
             None => Err(self.wrong_at(opened, "this bracket is never closed")),
-            Some(c) => Err(self.wrong(&format!(
-                "{c:?} is not expected here; allowed: + - * / ^, a name, or a bracket"
-            ))),
+            Some(c) => Err(self.unexpected(c)),
         }
     }
 
@@ -303,9 +330,11 @@ impl Parser<'_> {
             } else {
                 format!("the parameters {}", parameters.join(", "))
             };
+            let other = OTHERS.iter().find(|(other, _)| *other == name);
             let message = format!(
-                "unknown name {name:?}; known: x, y, z, pi, {}, and {own}",
-                functions.join(", ")
+                "unknown name {name:?}; known: x, y, z, pi, {}, and {own}{}",
+                functions.join(", "),
+                other.map_or("", |(_, hint)| hint)
             );
             return Err(self.wrong_at(start, &message));
         };
@@ -430,6 +459,13 @@ mod tests {
             ("sin(x, y)", 1, 1, "2 arguments here, and takes 1"),
             ("min(x)", 1, 1, "1 argument here, and takes 2 or more"),
             ("x $ y", 1, 3, "'$' is not expected"),
+            ("x**2", 1, 3, "or a bracket; powers are written x^2"),
+            ("x²", 1, 2, "or a bracket; powers are written x^2"),
+            ("(x² + 1)", 1, 3, "powers are written x^2"),
+            ("pow(x, 2)", 1, 1, "powers are written x^2"),
+            ("sqr(y)", 1, 1, "powers are written x^2"),
+            ("x = 1", 1, 3, "move everything to one side"),
+            ("x < 1", 1, 3, "move everything to one side"),
             ("1e99", 1, 1, "too large"),
             ("x + (1e15^30 - 1e15^30)", 1, 14, "numbers give inf here"),
             ("1e15^2 * 1e15 * x", 1, 15, "they must stay below 1e30"),

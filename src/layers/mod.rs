@@ -46,6 +46,15 @@ pub enum NoScene {
     Other,
 }
 
+/// Refuses a scene that a film was not rendered from.
+pub fn check_scene(provenance: &Provenance, scene: &Scene) -> Result<(), NoScene> {
+    if hash_of(&Canonical::new(scene), &provenance.settings) == provenance.scene_hash {
+        Ok(())
+    } else {
+        Err(NoScene::Other)
+    }
+}
+
 impl View {
     /// Of a scene as these settings render it.
     pub fn new(scene: &Scene, settings: &Settings) -> Self {
@@ -77,9 +86,7 @@ impl View {
     /// Of a film. `path` is that of its scene file, or any name beside it: files of rows that the scene names lie there.
     pub fn of_film(provenance: &Provenance, path: &Path) -> Result<Self, NoScene> {
         let scene = parse::parse_str(path, &provenance.scene_text).map_err(NoScene::Invalid)?;
-        if hash_of(&Canonical::new(&scene), &provenance.settings) != provenance.scene_hash {
-            return Err(NoScene::Other);
-        }
+        check_scene(provenance, &scene)?;
         Ok(Self::new(&scene, &provenance.settings))
     }
 

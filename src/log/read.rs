@@ -1,6 +1,7 @@
 //! Reads logs.
 
 use super::{Event, Level, Message, Point, Start};
+use crate::files::kind::FileKind;
 use crate::files::{FileError, open};
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -80,6 +81,10 @@ pub fn read(path: &Path) -> Result<Log, FileError> {
             .map_err(|e| FileError::reading(path, &e))?;
         number += 1;
         let wrong = |why: &str| {
+            if number == 1 && !line.starts_with(b"{") {
+                let kind = FileKind::of(&line).map_or("binary data".to_owned(), |k| k.to_string());
+                return Err(FileError::content(path, format!("not a log ({kind})")));
+            }
             let start = String::from_utf8_lossy(&line);
             let start: String = start.trim_end().chars().take(40).collect();
             let message =

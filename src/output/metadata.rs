@@ -22,7 +22,7 @@ impl std::fmt::Display for Value {
 
 /// The keys whose values are numbers.
 #[cfg(any(feature = "cli", test))]
-pub const NUMBERS: [&str; 9] = [
+pub const NUMBERS: [&str; 10] = [
     "samples",
     "replicates",
     "seed",
@@ -32,6 +32,8 @@ pub const NUMBERS: [&str; 9] = [
     "seconds",
     "relative_error",
     "relative_error_uncertainty",
+    // Of PNG pictures alone.
+    "exposure",
 ];
 
 /// Keys and values, in a fixed order. Unknown values, such as a missing title or relative error, are left out.
@@ -95,6 +97,7 @@ mod tests {
             .iter()
             .filter(|(_, value)| matches!(value, Value::Number(_)))
             .map(|(key, _)| *key)
+            .chain(["exposure"])
             .collect();
         assert_eq!(numbers, NUMBERS);
     }

@@ -11,6 +11,9 @@ use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 use std::io::{self, Write};
 use std::path::Path;
 
+/// The key of the exposure in stops, which only PNG pictures have.
+const EXPOSURE: &str = "exposure";
+
 /// Writes the whole picture, brightened by `exposure_stops` powers of two. Where pixels lack samples
 /// there is an alpha channel, 0 for them and 255 for the others.
 ///
@@ -22,11 +25,12 @@ pub fn write_png(
     exposure_stops: f64,
 ) -> Result<(), FileError> {
     let pixels = Pixels::new(film);
+    let exposure = (EXPOSURE, Value::Number(exposure_stops));
     let drawing = Drawing {
         size: film.size,
         opaque: pixels.complete(),
         gain: exposure_stops.exp2(),
-        entries: entries(provenance),
+        entries: entries(provenance).into_iter().chain([exposure]).collect(),
     };
     drawing.write(path, |x, y| pixels.at(x, y).map(|e| e.mean))
 }
@@ -47,6 +51,7 @@ pub fn write_png_of(
         entries: entries(provenance)
             .into_iter()
             .chain(more.iter().cloned())
+            .chain([(EXPOSURE, Value::Number(exposure_stops))])
             .collect(),
     };
     let width = bounds.width() as usize;
@@ -128,13 +133,19 @@ impl Drawing {
     }
 }
 
-/// The PNG specification's own keyword where it has one (11.3.3.1), else the key.
+/// Keys for which the PNG specification has a keyword of its own (11.3.3.1), and the keyword.
+const KEYWORDS: [(&str, &str); 2] = [("software", "Software"), ("scene", "Title")];
+
+/// The keyword of a key.
 fn keyword(key: &'static str) -> &'static str {
-    match key {
-        "software" => "Software",
-        "scene" => "Title",
-        other => other,
-    }
+    let own = KEYWORDS.into_iter().find(|(ours, _)| *ours == key);
+    own.map_or(key, |(_, keyword)| keyword)
+}
+
+/// The key of a keyword, which is that of other pictures too.
+pub(super) fn key(keyword: &str) -> &str {
+    let own = KEYWORDS.into_iter().find(|(_, theirs)| *theirs == keyword);
+    own.map_or(keyword, |(key, _)| key)
 }
 
 /// Level 0..=255 of a linear value: IEC 61966-2-1, both pieces of its curve. NaN is 0.

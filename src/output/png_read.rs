@@ -16,7 +16,7 @@ pub struct Png {
     pub rgb: Vec<[f64; 3]>,
     /// Whether alpha is more than 0.
     pub covered: Vec<bool>,
-    /// The text chunks, by keyword.
+    /// The text chunks: those that other pictures have too by the key that these have, others by keyword.
     pub texts: Vec<(String, String)>,
 }
 
@@ -27,7 +27,7 @@ pub struct PngHeader {
     pub size: [u32; 2],
     /// The channels with their bits, such as `RGB (8 bits)`.
     pub channels: String,
-    /// The text chunks, by keyword.
+    /// The text chunks, likewise.
     pub texts: Vec<(String, String)>,
 }
 
@@ -98,7 +98,9 @@ fn texts(info: &Info) -> Vec<(String, String)> {
     let latin1 = latin1.map(|t| (t.keyword.clone(), t.text.clone()));
     let utf8 = info.utf8_text.iter();
     let utf8 = utf8.filter_map(|t| Some((t.keyword.clone(), t.get_text().ok()?)));
-    latin1.chain(utf8).collect()
+    let all = latin1.chain(utf8);
+    all.map(|(keyword, text)| (super::png::key(&keyword).to_owned(), text))
+        .collect()
 }
 
 /// Linear value of an sRGB value from 0 to 1: IEC 61966-2-1, both pieces of its curve.

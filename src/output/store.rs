@@ -89,9 +89,10 @@ struct Kind {
     format_version: u32,
 }
 
-/// Bytes that a pixel of a film may take in a file: mean, error, count, reach, sums of finished and unfinished blocks, and of splats.
-pub fn pixel_bytes(film: &Film) -> u64 {
-    let splats = if film.splats().is_some() { 128 } else { 0 };
+/// Bytes that a pixel of a film may take in a file: mean, error, count, reach, sums of finished and unfinished blocks, and of splats if
+/// it has light paths.
+pub fn pixel_bytes(light_paths: bool) -> u64 {
+    let splats = if light_paths { 128 } else { 0 };
     12 + 16 + 8 + 1 + 128 + 64 + splats
 }
 

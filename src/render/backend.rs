@@ -63,6 +63,35 @@ impl Device {
         })
     }
 
+    /// This device for options that name `backend` and `adapter`, or why it is not what they name.
+    pub fn for_options(&self, backend: Backend, adapter: Option<&str>) -> Result<Self, Error> {
+        let is = match &self.gpu {
+            Some(gpu) => gpu.info().name.as_str(),
+            None => "the CPU reference",
+        };
+        let named = |part: &str| is.to_lowercase().contains(&part.to_lowercase());
+        let wanted = match (backend, adapter) {
+            (Backend::Cpu, _) if self.gpu.is_some() => "backend cpu".to_owned(),
+            (Backend::Gpu, None) if self.gpu.is_none() => "backend gpu".to_owned(),
+            (_, Some(part)) if self.gpu.is_none() || !named(part) => format!("adapter {part:?}"),
+            _ => {
+                let backend = match backend {
+                    Backend::Auto => self.backend,
+                    other => other,
+                };
+                let adapter = adapter.map(str::to_owned).or_else(|| self.adapter.clone());
+                return Ok(Self {
+                    backend,
+                    adapter,
+                    ..self.clone()
+                });
+            }
+        };
+        Err(Error::Input(format!(
+            "the options name {wanted}, but the renderer was opened on {is}; open another, or leave backend and adapter as they are by default"
+        )))
+    }
+
     /// An engine on it, ready for this scene. Calls `tell` at each step of the preparation.
     pub fn engine(
         &self,

@@ -16,13 +16,15 @@ use crate::files::FileError;
 use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::film::error::RelativeError;
+use crate::implicit::WrongFormula;
 use crate::provenance::Provenance;
 use crate::run::Tally;
-use crate::scene::parse::ReadError;
-use crate::scene::{Diagnostic, Invalid, LARGEST_RESOLUTION, LARGEST_STRATA, Scene};
+use crate::scene::parse::{self, ReadError};
+use crate::scene::{Diagnostic, LARGEST_RESOLUTION, LARGEST_STRATA, Scene, SceneBuilder};
 use crate::settings::{Integrator, LightParts, Overrides};
 use std::io::ErrorKind;
 use std::ops::{ControlFlow, Range};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -33,6 +35,9 @@ pub const DEFAULT_SPP: u64 = 256;
 /// Rendering time on the CPU reference unless a stop condition is given: [`DEFAULT_SPP`] samples of an ordinary picture take minutes
 /// there.
 pub const CPU_TIME: Duration = Duration::from_secs(30);
+
+/// The longest rendering: a year.
+pub const LONGEST: Duration = Duration::from_secs(366 * 86400);
 
 /// The most samples that a pixel can have: they are numbered in 32 bits.
 pub const MAX_SAMPLES: u64 = u32::MAX as u64;
@@ -80,9 +85,28 @@ impl From<ReadError> for Error {
     }
 }
 
-impl From<Invalid> for Error {
-    fn from(Invalid(diagnostics): Invalid) -> Self {
-        Self::Scene(diagnostics)
+impl From<WrongFormula> for Error {
+    fn from(wrong: WrongFormula) -> Self {
+        Self::Input(wrong.to_string())
+    }
+}
+
+impl Scene {
+    /// The scene in a file, and in the files of rows that it names.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Ok(parse::read(path.as_ref())?)
+    }
+
+    /// The scene in the text of a scene file. Files of rows that it names lie relative to the working directory.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        parse::parse_str(Path::new("scene"), text).map_err(Error::Scene)
+    }
+}
+
+impl SceneBuilder {
+    /// The scene, or all that is wrong with it: [`Error::Scene`], whose messages name the things that were given.
+    pub fn build(&self) -> Result<Scene, Error> {
+        self.checked().map_err(Error::Scene)
     }
 }
 
@@ -97,10 +121,10 @@ pub struct Options {
     /// Take only the samples of these numbers: disjoint ones may be taken on several machines and [merged](crate::merge). Not together
     /// with another stop condition, or with `adaptive`.
     pub numbers: Option<Range<u64>>,
-    /// Stop after this long in the engine, but not before every pixel has a sample. How many samples that is differs from run
+    /// Stop after this long in the engine, at most a year, but not before every pixel has a sample. How many samples that is differs from run
     /// to run.
     pub time: Option<Duration>,
-    /// Stop when the picture's estimated relative error, plus twice its uncertainty, is at most this; 0.02 is 2 %. Not while there is no
+    /// Stop when the picture's estimated relative error, plus twice its uncertainty, is at most this; 0.02 is 2 %, and 1 the most. Not while there is no
     /// light yet in a part of the picture where there might be some: give `time` or `spp` too, for where there is none.
     pub error: Option<f64>,
     /// Set it to true, from any thread, to end the rendering at once; [`render`] then gives what there is. Before the first sample it
@@ -179,9 +203,17 @@ impl Options {
             MAX_SHADOW_RAYS.into(),
         )?;
         if let Some(error) = self.error
-            && !(error > 0.0 && error.is_finite())
+            && !(error > 0.0 && error <= 1.0)
         {
-            let message = format!("error is {error}, but must be a finite number above 0");
+            let message = format!(
+                "error is {error}, but must be a number above 0 and at most 1, which is 100 %"
+            );
+            return Err(Error::Input(message));
+        }
+        if let Some(time) = self.time
+            && (time.is_zero() || time > LONGEST)
+        {
+            let message = format!("time is {time:?}, but must be more than 0 and at most a year");
             return Err(Error::Input(message));
         }
         if let Some(light) = self.light
@@ -266,7 +298,8 @@ pub fn render(scene: &Scene, options: &Options) -> Result<Picture, Error> {
     render_with(scene, options, |_| ControlFlow::Continue(()))
 }
 
-/// The same, and `watch` hears how far it has come, about once a second. When it breaks, the rendering ends, and the picture
+/// The same, and `watch` hears how far it has come: once there are samples, then about once a second if there are more, and at the
+/// end. When it breaks, the rendering ends, and the picture
 /// is what there is.
 pub fn render_with(
     scene: &Scene,

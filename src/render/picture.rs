@@ -8,10 +8,11 @@ use crate::film::{self, Estimate, Film};
 use crate::output::{Format, Pixels, WriteOptions, store, write_png};
 use crate::provenance::Provenance;
 use crate::run::StopReason;
+use std::fmt;
 use std::path::Path;
 
 /// A picture, the error of each of its pixels, and where it comes from. Lists of pixels go row by row from the top left.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Picture {
     film: Film,
     provenance: Provenance,
@@ -20,6 +21,18 @@ pub struct Picture {
     pixels: Vec<[f32; 3]>,
     errors: Vec<[f32; 3]>,
     samples: Vec<u64>,
+}
+
+/// A short summary, without the pixels.
+impl fmt::Debug for Picture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Picture")
+            .field("scene", &self.provenance.scene_title)
+            .field("film", &self.film)
+            .field("relative_error", &self.provenance.relative_error)
+            .field("ended", &self.ended)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Picture {

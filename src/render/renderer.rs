@@ -10,12 +10,12 @@ use crate::film::Film;
 use crate::film::coverage::Rect;
 use crate::film::pilot::Pilot;
 use crate::provenance::Provenance;
-use crate::run::{self, Job, Run, StopReason};
+use crate::run::{self, Job, Run, StopReason, Tally};
 use crate::scene::{self, Canonical, Scene};
 use crate::settings::{Changed, Settings};
 use crate::world::World;
-use std::borrow::Cow;
 use std::ops::ControlFlow;
+use std::time::Instant;
 
 /// An open device, for picture after picture: an animation, or one picture that is brought on. Opening a device takes a part of a
 /// second, which short renderings would spend each time.
@@ -43,7 +43,8 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Opens the device that the options' `backend` and `adapter` name. Those of later options do not count.
+    /// Opens the device that the options' `backend` and `adapter` name. Later options may leave them out, and are refused if they name
+    /// another.
     pub fn open(options: &Options) -> Result<Self, Error> {
         options.check()?;
         let device = Device::open(options.backend, options.adapter.as_deref())?;
@@ -98,6 +99,9 @@ pub(super) fn render(
     mut watch: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<Picture, Error> {
     options.check()?;
+    let device = device
+        .map(|open| open.for_options(options.backend, options.adapter.as_deref()))
+        .transpose()?;
     let (scene, text) = scene::checked(scene).map_err(Error::Scene)?;
     let held = held.map(Picture::into_parts);
     let mut overrides = options.overrides();
@@ -125,8 +129,8 @@ pub(super) fn render(
     };
     let world = World::of(&ordered, settings.size);
     let device = match device {
-        Some(device) => Cow::Borrowed(device),
-        None => Cow::Owned(Device::open(options.backend, options.adapter.as_deref())?),
+        Some(device) => device,
+        None => Device::open(options.backend, options.adapter.as_deref())?,
     };
     let mut chosen = device.engine(&world, &settings, |_| ())?;
     let light_paths = chosen.engine.light_paths();
@@ -167,14 +171,18 @@ pub(super) fn render(
     };
     let device = chosen.engine.device().clone();
     let mut run = Run::new(&job, chosen.engine.as_mut(), &mut film, &options.stop);
+    let mut told: Option<Told> = None;
+    let black = before.black;
     // What ends it besides the engine is `watch`, and that is no error.
     let ended = run.go(|film, tally| {
-        let progress = Progress {
-            film,
-            tally,
-            black: before.black,
-        };
-        match watch(&progress) {
+        if told.as_ref().is_some_and(|last| !last.is_due(tally)) {
+            return Ok(());
+        }
+        told = Some(Told {
+            samples: tally.samples,
+            when: Instant::now(),
+        });
+        match watch(&Progress { film, tally, black }) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(None::<EngineError>),
         }
@@ -188,8 +196,26 @@ pub(super) fn render(
     if film.coverage.is_empty() {
         return Err(Error::Stopped);
     }
+    if ended != StopReason::Interrupted && told.is_some_and(|last| last.samples != tally.samples) {
+        let (film, tally) = (&film, &tally);
+        // It has ended already, whatever the answer is.
+        let _ = watch(&Progress { film, tally, black });
+    }
     let provenance = provenance(&before, &device, &film, &tally);
     Ok(Picture::new(film, provenance, Some(ended), chosen.note))
+}
+
+/// What `watch` was told last.
+struct Told {
+    samples: f64,
+    when: Instant,
+}
+
+impl Told {
+    /// Whether there is something new, and it is time. Calls to the engine take up to a second: where they do, each is told.
+    fn is_due(&self, tally: &Tally) -> bool {
+        tally.samples != self.samples && self.when.elapsed() >= run::CALL / 2
+    }
 }
 
 /// The pixels to render, within a picture of `size`: all if none are asked for.

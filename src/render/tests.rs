@@ -92,6 +92,81 @@ fn each_stop_condition_ends_it() {
     assert!(matches!(render(&scene(), &stopped), Err(Error::Stopped)));
 }
 
+/// The reference takes four samples of a pixel at once here, and is asked at once whether to go on.
+#[test]
+fn those_who_watch_hear_of_each_change_once_and_of_the_end() {
+    let mut heard = Vec::new();
+    let options = Options {
+        spp: Some(4096),
+        ..cpu()
+    };
+    let begun = std::time::Instant::now();
+    let picture = render_with(&scene(), &options, |progress| {
+        heard.push(progress.samples());
+        ControlFlow::Continue(())
+    });
+    assert!(picture.is_ok());
+    assert!(heard.windows(2).all(|two| two[0] < two[1]), "{heard:?}");
+    assert_eq!(heard.last(), Some(&4096.0), "{heard:?}");
+    let seconds = begun.elapsed().as_secs_f64();
+    assert!(heard.len() as f64 <= 3.0 + 2.0 * seconds, "{heard:?}");
+}
+
+#[test]
+fn a_renderer_refuses_options_of_another_device() {
+    let renderer = Renderer::open(&cpu()).unwrap();
+    let with = |backend, adapter: Option<&str>| Options {
+        backend,
+        adapter: adapter.map(str::to_owned),
+        ..cpu()
+    };
+    renderer
+        .render(&scene(), &with(Backend::Auto, None))
+        .unwrap();
+    for (options, named) in [
+        (with(Backend::Gpu, None), "backend gpu"),
+        (with(Backend::Auto, Some("llvm")), "adapter \"llvm\""),
+    ] {
+        match renderer.render(&scene(), &options) {
+            Err(Error::Input(why)) => assert_eq!(
+                why,
+                format!(
+                    "the options name {named}, but the renderer was opened on the CPU reference; open another, or leave backend and \
+                     adapter as they are by default"
+                )
+            ),
+            other => panic!("{other:?}"),
+        }
+    }
+    let gpu = Renderer::open(&with(Backend::Gpu, None)).unwrap();
+    let refused = gpu.render(&scene(), &cpu()).unwrap_err().to_string();
+    assert!(refused.starts_with("the options name backend cpu, but"));
+    let other = with(Backend::Auto, Some("no such"));
+    let refused = gpu.render(&scene(), &other).unwrap_err().to_string();
+    assert!(refused.starts_with("the options name adapter \"no such\", but"));
+}
+
+#[test]
+fn every_failure_is_an_error_of_this_crate_and_debug_is_short() {
+    fn all() -> Result<(), Error> {
+        let _ = crate::Implicit::new("x^2 + y^2 - 1", &[])?;
+        let picture = render(&Scene::builder().build()?, &cpu())?;
+        picture.save("never.exr")
+    }
+    assert!(matches!(all(), Err(Error::Scene(_))));
+    assert!(matches!(Scene::read("/no/such.toml"), Err(Error::File(_))));
+    assert!(matches!(Scene::parse("x"), Err(Error::Scene(_))));
+    let wrong = crate::Implicit::new("x +", &[]).map_err(Error::from);
+    assert!(matches!(wrong, Err(Error::Input(_))));
+
+    let picture = render(&scene(), &cpu()).unwrap();
+    let text = format!("{picture:?}");
+    assert!(text.starts_with("Picture { ") && text.contains("samples: (16, 16)"));
+    assert!(text.len() < 400, "{text}");
+    let side = crate::compare::Side::from_film("a".into(), picture.film(), picture.provenance());
+    assert!(format!("{side:?}").len() < 400);
+}
+
 #[test]
 fn regions_are_the_same_pixels_and_adaptive_pictures_are_complete() {
     let whole = render(&scene(), &cpu()).unwrap();
@@ -196,6 +271,27 @@ fn options_that_cannot_be_are_refused() {
                 ..cpu()
             },
             "error is 0",
+        ),
+        (
+            Options {
+                error: Some(5.0),
+                ..cpu()
+            },
+            "error is 5",
+        ),
+        (
+            Options {
+                time: Some(Duration::ZERO),
+                ..cpu()
+            },
+            "time is 0ns",
+        ),
+        (
+            Options {
+                time: Some(Duration::MAX),
+                ..cpu()
+            },
+            "time is 18446744073709551615.999999999s",
         ),
         (
             Options {

@@ -6,6 +6,7 @@ use super::{Bsdf, Camera, Diagnostic, Light, Parameter, Place, Scene, Shape};
 use super::{implicit, isosurface};
 use crate::implicit::{Implicit, Volume};
 use glam::DVec3;
+use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::sync::Arc;
 
@@ -212,11 +213,6 @@ impl SceneBuilder {
         self.table("light", text + &key("radius", radius))
     }
 
-    /// The scene, or all that is wrong with it.
-    pub fn build(&self) -> Result<Scene, Invalid> {
-        self.read().map_err(Invalid)
-    }
-
     /// The scene as the text of a scene file, unchecked.
     pub fn to_toml(&self) -> String {
         self.text().0
@@ -321,6 +317,24 @@ impl SceneBuilder {
         self
     }
 
+    /// What is there twice and may not be. The parser would speak of lines of a text that nobody has seen.
+    fn twice(&self) -> Vec<Diagnostic> {
+        let mut known = HashSet::new();
+        let mut is_known = |text: &str| {
+            let header = text.lines().next().unwrap_or_default();
+            !header.starts_with("[[") && !known.insert(header.to_owned())
+        };
+        let twice = self.tables.iter().filter(|(_, text)| is_known(text));
+        let wrong = twice.map(|(what, _)| {
+            let rule = match what.as_str() {
+                "camera" => "a scene has one camera",
+                _ => "every material has a name of its own",
+            };
+            about(what.clone(), format!("duplicate; {rule}"))
+        });
+        wrong.collect()
+    }
+
     /// The text, and the line at which each table begins.
     fn text(&self) -> (String, Vec<usize>) {
         let mut text = String::new();
@@ -341,7 +355,12 @@ impl SceneBuilder {
         (text, lines)
     }
 
-    fn read(&self) -> Result<Scene, Vec<Diagnostic>> {
+    /// The scene, if it keeps every rule; else one message for each thing that does not.
+    pub(crate) fn checked(&self) -> Result<Scene, Vec<Diagnostic>> {
+        let twice = self.twice();
+        if !twice.is_empty() {
+            return Err(twice);
+        }
         let (text, lines) = self.text();
         let mut scene = parse_with_volumes(&text, &self.volumes).map_err(|all| {
             let named = all.into_iter().map(|d| {
@@ -367,16 +386,11 @@ impl SceneBuilder {
     }
 }
 
-/// What is wrong with a scene that was built in code; each message names the thing that it is about.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}", super::parse::one_a_line(.0))]
-pub struct Invalid(pub Vec<Diagnostic>);
-
 /// `scene` and the text of a scene file that says the same. Its fields are public: all rules are checked again, and normals
 /// that have lost their unit length have it in what is returned.
 pub(crate) fn checked(scene: &Scene) -> Result<(Scene, String), Vec<Diagnostic>> {
     let builder = SceneBuilder::of(scene)?;
-    let read = builder.read()?;
+    let read = builder.checked()?;
     let unit = |n: DVec3| (n.length() - 1.0).abs() <= UNIT;
     let normals = scene.primitives.iter().all(|p| match p.shape {
         Shape::Plane { normal, .. } | Shape::Disk { normal, .. } => unit(normal),
@@ -494,7 +508,11 @@ mod tests {
             "{empty}"
         );
         let twice = room().diffuse("m", [0.5; 3]).build().unwrap_err();
-        assert!(twice.to_string().contains("duplicate"), "{twice}");
+        let said = "material \"m\": duplicate; every material has a name of its own";
+        assert_eq!(twice.to_string(), said);
+        let cameras = room().camera([1.0; 3], [0.0; 3], 40.0, [8, 6]).build();
+        let said = cameras.unwrap_err().to_string();
+        assert_eq!(said, "camera: duplicate; a scene has one camera");
     }
 
     #[test]

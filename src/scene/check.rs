@@ -58,7 +58,11 @@ pub fn lint(scene: &Scene) -> Vec<Diagnostic> {
 
 /// The warnings about a picture of this size from a GPU; or from the reference, which has f64, without a size.
 pub fn lints(scene: &Scene, on_gpu: Option<[u32; 2]>) -> Lints {
-    let mut picture = vec![eye::warnings(scene), implicit::warnings(scene)];
+    let mut picture = vec![
+        no_rows(scene),
+        eye::warnings(scene),
+        implicit::warnings(scene),
+    ];
     picture.extend(on_gpu.map(|size| far::warnings(scene, size)));
     let mut remarks = vec![
         materials(scene),
@@ -110,6 +114,17 @@ fn diagnostics(scene: &Scene, kinds: Vec<Warnings>) -> Vec<Diagnostic> {
         }));
     }
     diagnostics
+}
+
+/// Files of rows that have none.
+fn no_rows(scene: &Scene) -> Warnings {
+    let mut warnings = Warnings::default();
+    for file in scene.row_files.iter().filter(|f| f.rows == 0) {
+        warnings.add(file.place, || {
+            format!("{} has no rows", file.path.display())
+        });
+    }
+    warnings
 }
 
 /// Materials that do nothing.
@@ -222,6 +237,40 @@ radiance = [9, 9, 9]
                [[cylinder]]\nbase = [-1,0,0]\ntop = [-1,1,0]\nradius = 0.3\nmaterial = 'glass'\n\
                [[disk]]\ncenter = [0,1,-3]\nnormal = [0,0,1]\nradius = 0.5\nmaterial = 'red'\n";
         assert_eq!(lint(&scene(&text)), []);
+    }
+
+    #[test]
+    fn files_without_rows() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("test.toml");
+        std::fs::write(
+            dir.path().join("lamps.csv"),
+            "x,y,z,nx,ny,nz,radius,r,g,b\n",
+        )
+        .unwrap();
+        std::fs::write(dir.path().join("parts.csv"), "x,y,z\n\n").unwrap();
+        std::fs::write(dir.path().join("none.xyz"), "0\n\n").unwrap();
+        let all = "[[lights]]\nfile = 'lamps.csv'\n\
+            [[spheres]]\nfile = 'parts.csv'\nradius = 1\nmaterial = 'white'\n\
+            [[spheres]]\nfile = 'none.xyz'\nradius = 1\nmaterial = 'white'\n";
+        let read = |text: &str| parse_str(&path, text);
+        let Lints { picture, .. } = lints(&read(&with(&(room() + all))).unwrap(), None);
+        let said: Vec<String> = picture.iter().map(Diagnostic::to_string).collect();
+        assert_eq!(said.len(), 3, "{said:?}");
+        for (k, name) in ["parts.csv", "none.xyz", "lamps.csv"].iter().enumerate() {
+            let expected = format!("{} has no rows", dir.path().join(name).display());
+            assert!(said[k].ends_with(&expected) && said[k].contains("test.toml:"));
+        }
+        // Where there is nothing else, that is why.
+        let (dark, _) = STAGE.split_once("[[light]]").unwrap();
+        let wrong = read(&format!("{dark}{all}")).unwrap_err();
+        let [primitive, light] = &wrong[..] else {
+            panic!("{wrong:?}");
+        };
+        let parts = format!("; {} has no rows", dir.path().join("parts.csv").display());
+        let lamps = format!("; {} has no rows", dir.path().join("lamps.csv").display());
+        assert!(primitive.message.contains(&parts), "{primitive}");
+        assert!(light.message.contains(&lamps), "{light}");
     }
 
     #[test]

@@ -21,8 +21,8 @@ mod surfaces;
 mod syntax;
 mod value;
 
+pub use build::SceneBuilder;
 pub(crate) use build::checked;
-pub use build::{Invalid, SceneBuilder};
 pub use material::Bsdf;
 pub(crate) use material::{MaterialKind, Parameter};
 #[doc(hidden)]
@@ -33,7 +33,7 @@ pub use value::{LARGEST_RESOLUTION, LARGEST_STRATA};
 use crate::implicit::Implicit;
 use glam::DVec3;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Path vertices after the eye when neither file nor flag says.
@@ -48,7 +48,7 @@ pub struct Scene {
     /// Where it was read from; empty for scenes made in memory.
     pub path: PathBuf,
     /// The other files that it names: those of rows, and volumes.
-    pub row_files: Vec<PathBuf>,
+    pub row_files: Vec<RowFile>,
     /// `title`, if the file has one.
     pub title: Option<String>,
     /// The pinhole camera.
@@ -68,16 +68,17 @@ impl Scene {
     pub fn builder() -> SceneBuilder {
         SceneBuilder::default()
     }
+}
 
-    /// The scene in a file, and in the files of rows that it names.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, parse::ReadError> {
-        parse::read(path.as_ref())
-    }
-
-    /// The scene in the text of a scene file. Files of rows that it names lie relative to the working directory.
-    pub fn parse(text: &str) -> Result<Self, Invalid> {
-        parse::parse_str(Path::new("scene"), text).map_err(Invalid)
-    }
+/// Another file that a scene names: of rows, or a volume.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RowFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// How many surfaces or lights it holds; a volume is one.
+    pub rows: usize,
+    /// Where the scene names it.
+    pub place: Place,
 }
 
 /// Pinhole camera. `up` is not parallel to the view.

@@ -6,7 +6,9 @@ use super::reader::Reader;
 use super::rows::{Palette, RowKind};
 use super::source::{Faults, Source, quoted, suggestion};
 use super::value::Text;
-use super::{Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, Scene, Shape};
+use super::{
+    Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, RowFile, Scene, Shape,
+};
 use super::{rows, schema, syntax};
 use crate::files::kind::FileKind;
 use crate::files::reason;
@@ -187,8 +189,9 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
         }
     }
     if lights.is_empty() && !file.is_wrong("light") {
-        file.faults
-            .push(None, "no [[light]]; a scene needs at least one".into());
+        let empty = file.faults.empty_row_files();
+        let message = format!("no [[light]]; a scene needs at least one{empty}");
+        file.faults.push(None, message);
     }
     file.refuse_unknown_keys();
 
@@ -206,9 +209,11 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
         })
     });
     let materials: Option<Vec<Material>> = named.chain(colors).collect();
+    let mut row_files = file.faults.take_row_files();
+    row_files.extend(volumes(source, root));
     Some(Scene {
         path: source.path().to_owned(),
-        row_files: row_files(source, root),
+        row_files,
         title: title.map(|t| t.0),
         camera: camera?,
         render: render?,
@@ -218,16 +223,18 @@ fn scene(source: &Source, root: &DeTable, faults: &mut Faults) -> Option<Scene> 
     })
 }
 
-/// The files of rows and the volumes that the scene names.
-fn row_files(source: &Source, root: &DeTable) -> Vec<PathBuf> {
-    let tables = |key: &str| root.get(key).and_then(|v| v.get_ref().as_array());
-    let all = ["spheres", "cylinders", "lights", "isosurface"]
-        .into_iter()
-        .filter_map(tables);
-    let names = all
-        .flatten()
-        .filter_map(|t| t.get_ref().as_table()?.get("file")?.get_ref().as_str());
-    names.map(|name| source.beside(name)).collect()
+/// The volumes that the scene names.
+fn volumes(source: &Source, root: &DeTable) -> impl Iterator<Item = RowFile> {
+    let all = root.get("isosurface").and_then(|v| v.get_ref().as_array());
+    let tables = all.into_iter().flatten();
+    let names = tables.filter_map(|t| t.get_ref().as_table()?.get("file"));
+    names.filter_map(|name| {
+        Some(RowFile {
+            path: source.beside(name.get_ref().as_str()?),
+            rows: 1,
+            place: source.place(name.span().start),
+        })
+    })
 }
 
 /// A material as far as it is known.
@@ -356,9 +363,11 @@ fn primitives(
     );
     let wrong = ShapeKind::ALL.iter().any(|kind| file.is_wrong(kind.name()));
     if primitives.is_empty() && !wrong {
-        let message = "no primitive; a scene needs at least one \
-                       [[sphere]], [[plane]], [[disk]], [[cylinder]], [[implicit]] or [[isosurface]]";
-        file.faults.push(None, message.into());
+        let empty = file.faults.empty_row_files();
+        let message = format!(
+            "no primitive; a scene needs at least one [[sphere]], [[plane]], [[disk]], [[cylinder]], [[implicit]] or [[isosurface]]{empty}"
+        );
+        file.faults.push(None, message);
     }
     primitives
 }

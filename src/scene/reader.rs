@@ -3,7 +3,7 @@
 use super::format::{Found, Inner, Need, Table};
 use super::isosurface::NoVolume;
 use super::source::{Faults, Source, quoted, shorten, suggestion};
-use super::value::{Text, Value};
+use super::value::{Text, Value, without_reason};
 use super::{Bsdf, MaterialKind, Place, rows, schema};
 use crate::implicit::{AxisOrder, Volume};
 use std::borrow::Cow;
@@ -39,7 +39,7 @@ impl Table for Reader<'_, '_> {
                 let message = format!(
                     "missing key {key} in {}; it must be {}",
                     self.what,
-                    T::rule()
+                    without_reason(&T::rule())
                 );
                 self.faults.push(self.place(), message);
             }
@@ -58,7 +58,15 @@ impl Table for Reader<'_, '_> {
                     }
                     _ => quote,
                 };
-                let message = format!("{key}{index} is {value}; {key} must be {}", T::rule());
+                let at = match (found.get_ref(), wrong.index) {
+                    (DeValue::Array(all), Some(i)) => all.get(i).map(Spanned::get_ref),
+                    (other, _) => Some(other),
+                };
+                let rule = match at {
+                    Some(DeValue::Integer(_) | DeValue::Float(_)) => T::rule(),
+                    _ => without_reason(&T::rule()),
+                };
+                let message = format!("{key}{index} is {value}; {key} must be {rule}");
                 self.faults.push(Some(wrong.span.start), message);
                 Found::Wrong
             }
@@ -176,7 +184,13 @@ impl<'a, 't> Reader<'a, 't> {
             None => rows::read(&path).map(Cow::Owned),
         };
         match text.and_then(|text| read(&path, &text)) {
-            Ok(rows) => Some(rows),
+            Ok(rows) => {
+                let place = self.place_of("file");
+                let place = place.map_or(Place::default(), |at| self.source.place(at));
+                let count = rows.len();
+                self.faults.row_file(path, count, place);
+                Some(rows)
+            }
             Err(rows::Wrong::Unreadable(why)) => {
                 let place = self.place_of("file");
                 let message = format!("cannot read {}: {why}", path.display());
@@ -296,18 +310,14 @@ impl<'a, 't> Reader<'a, 't> {
     }
 
     pub(super) fn refuse_unknown_keys(&mut self) {
-        for key in self
-            .table
-            .keys()
-            .filter(|k| !self.known.contains(&k.get_ref().as_ref()))
-        {
+        for (key, value) in self.table {
             let word = key.get_ref().as_ref();
-            let place = match word {
-                "title" => "; a title stands at the top of the file, before the first [table]",
-                _ => "",
-            };
+            if self.known.contains(&word) {
+                continue;
+            }
+            let meant = self.meant(word, value.get_ref());
             let message = format!(
-                "unknown key {} in {}; allowed: {}{}{}{place}",
+                "unknown key {} in {}; allowed: {}{}{}{meant}",
                 quoted(word),
                 self.what,
                 self.known.join(", "),
@@ -315,6 +325,55 @@ impl<'a, 't> Reader<'a, 't> {
                 self.owners(word)
             );
             self.faults.push(Some(key.span().start), message);
+        }
+    }
+
+    /// What is written otherwise than by a key of this name here, if that is known.
+    fn meant(&self, word: &str, value: &DeValue) -> String {
+        /// What other formats have, and programs for drawing.
+        const SHAPES: [&str; 12] = [
+            "box",
+            "cube",
+            "mesh",
+            "triangle",
+            "triangles",
+            "quad",
+            "rectangle",
+            "rect",
+            "torus",
+            "cone",
+            "ellipsoid",
+            "model",
+        ];
+        /// Flags of `etendue render` that are no keys of `[render]`.
+        const FLAGS: [(&str, &str); 9] = [
+            ("spp", "--spp"),
+            ("samples", "--spp"),
+            ("rays", "--rays"),
+            ("time", "--time"),
+            ("error", "--error"),
+            ("integrator", "--integrator"),
+            ("shadow_rays", "--shadow-rays"),
+            ("exposure", "--exposure"),
+            ("adaptive", "--adaptive"),
+        ];
+        let in_scene = self.known.contains(&"camera");
+        let has_type = |table: &DeTable| table.contains_key("type");
+        if word == "title" {
+            "; a title stands at the top of the file, before the first [table]".into()
+        } else if in_scene && value.as_table().is_some_and(has_type) {
+            let name = shorten(word);
+            format!("; a material is written [material.{name}]")
+        } else if in_scene && SHAPES.contains(&word) {
+            "; there are spheres, planes, disks, cylinders and implicit surfaces, among which are boxes, tori and cones; no meshes".into()
+        } else if let ("[render]", Some((_, flag))) =
+            (self.what, FLAGS.iter().find(|(name, _)| *name == word))
+        {
+            format!("; that is the flag {flag} of etendue render")
+        } else if self.what == "[[light]]" && word == "type" {
+            "; every light is a disk that shines on one side; a small radius makes it nearly a point".into()
+        } else {
+            String::new()
         }
     }
 

@@ -1,7 +1,7 @@
 //! Places in the text of a scene file: converts byte offsets to lines, columns and short quotes.
 
 use super::isosurface::{self, NoVolume};
-use super::{Diagnostic, Place};
+use super::{Diagnostic, Place, RowFile};
 use crate::implicit::{AxisOrder, Volume};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -157,6 +157,8 @@ pub(super) struct Faults {
     uncounted: usize,
     /// Those in files that the scene names.
     elsewhere: Vec<Diagnostic>,
+    /// Files of rows in which nothing is wrong.
+    row_files: Vec<RowFile>,
 }
 
 impl Faults {
@@ -165,6 +167,7 @@ impl Faults {
             found: Vec::new(),
             uncounted: 0,
             elsewhere: Vec::new(),
+            row_files: Vec::new(),
         }
     }
 
@@ -175,6 +178,24 @@ impl Faults {
     /// Errors in another file.
     pub(super) fn push_elsewhere(&mut self, errors: Vec<Diagnostic>) {
         self.elsewhere.extend(errors);
+    }
+
+    /// A file of rows in which nothing is wrong, but that there may be none.
+    pub(super) fn row_file(&mut self, path: PathBuf, rows: usize, place: Place) {
+        self.row_files.push(RowFile { path, rows, place });
+    }
+
+    /// All of them, in the order in which they were read.
+    pub(super) fn take_row_files(&mut self) -> Vec<RowFile> {
+        std::mem::take(&mut self.row_files)
+    }
+
+    /// The files that have no rows, to follow a message that there is nothing of a kind.
+    pub(super) fn empty_row_files(&self) -> String {
+        let empty = self.row_files.iter().filter(|f| f.rows == 0);
+        empty
+            .map(|f| format!("; {} has no rows", f.path.display()))
+            .collect()
     }
 
     pub(super) fn push(&mut self, offset: Option<usize>, message: String) {

@@ -126,6 +126,21 @@ fn open_bracket(text: &str) -> Option<usize> {
 /// What someone may have meant who wrote this where a value stands.
 fn hint(text: &str, message: &str, span: &Range<usize>) -> &'static str {
     let found = text.get(span.clone()).unwrap_or_default().trim();
+    let line = text[..span.start].rfind('\n').map_or(0, |at| at + 1);
+    let rest = text[span.start..].trim_start_matches([' ', '\t']);
+    let is_comment = ["//", "/*", ";"].iter().any(|mark| found.starts_with(mark));
+    if is_comment || rest.starts_with("//") || (is_unquoted(message) && found.contains("//")) {
+        return "; comments begin with #";
+    }
+    if rest.starts_with(':') && !text[line..span.start].contains('=') {
+        return "; keys and values have = between them: eye = [0, 1, 4]";
+    }
+    if message.starts_with("invalid mantissa") || message.starts_with("invalid fraction") {
+        return "; numbers have digits on both sides of the point: 0.5, 1.0";
+    }
+    if message.starts_with("invalid float") || message.starts_with("invalid integer") {
+        return "; numbers have no letters or units behind them";
+    }
     if text[span.start..].starts_with(',') {
         return "; decimals have a point, and only lists have commas";
     }

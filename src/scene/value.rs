@@ -62,6 +62,12 @@ struct Interval {
 }
 
 const F32: &str = " (limits of f32 kernels)";
+
+/// A rule without the reason for its limits, for what is no number at all.
+pub(super) fn without_reason(rule: &str) -> String {
+    rule.replace(F32, "")
+}
+
 const SHARE: Interval = Interval::closed(0.0, 1.0, "");
 const COORDINATE: Interval = Interval::closed(-LARGEST, LARGEST, F32);
 const LENGTH: Interval = Interval::closed(SMALLEST, LARGEST, F32);

@@ -178,14 +178,27 @@ impl Rms {
 
 impl fmt::Display for Statement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "RMS error {} of mean luminance, bias included; of the denoised mean alone {}; raw {}; total light {:+.2} %",
-            self.mixture,
-            self.mean,
-            self.raw,
-            100.0 * self.mixture_light
-        )
+        match &self.mixture {
+            Rms::Known { .. } => write!(
+                f,
+                "RMS error {} of mean luminance, bias included",
+                self.mixture
+            )?,
+            Rms::Unknown(why) => write!(f, "its RMS error is not known, because {why}")?,
+        }
+        // What is not known for the same reason is not said again.
+        let others = [
+            ("of the denoised mean alone", &self.mean),
+            ("raw", &self.raw),
+        ];
+        for (what, rms) in others {
+            match rms {
+                Rms::Known { .. } => write!(f, "; {what} {rms}")?,
+                Rms::Unknown(why) if self.mixture.why() == Some(why) => {}
+                Rms::Unknown(why) => write!(f, "; {what} not known, because {why}")?,
+            }
+        }
+        write!(f, "; total light {:+.2} %", 100.0 * self.mixture_light)
     }
 }
 

@@ -226,6 +226,32 @@ fn an_output_that_cannot_be_written_takes_no_other_with_it() {
         .code(4)
         .stderr(full().and(says("wrote later.png")));
     assert!(bench.path("later.png").exists());
+    bench
+        .run("develop f.npz -o full.exr")
+        .code(4)
+        .stderr(full().and(says("wrote").not()));
+}
+
+#[test]
+fn the_scene_of_a_film_is_the_one_that_is_given() {
+    let bench = Bench::new();
+    bench.render("--spp 1 --film f.npz -o a.png");
+    let other = SCENE.replace("radius   = 0.45", "radius   = 0.4");
+    fs::write(bench.path("other.toml"), other).unwrap();
+    for what in ["-o b.exr --layers id", "-o b.exr"] {
+        let develop = format!("develop f.npz {what} --scene");
+        bench.run(&format!("{develop} box.toml")).success();
+        bench
+            .run(&format!("{develop} none.toml"))
+            .code(4)
+            .stderr(says("error: none.toml: cannot read the scene: "));
+        bench
+            .run(&format!("{develop} other.toml"))
+            .code(2)
+            .stderr(says(
+                "error: other.toml: this is not the scene that the film was rendered from",
+            ));
+    }
 }
 
 /// An edited scene is a person's own work.

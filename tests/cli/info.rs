@@ -13,7 +13,10 @@ fn json(bench: &Bench, file: &str) -> Value {
 #[test]
 fn films_and_pictures_say_the_same_of_themselves() {
     let bench = Bench::new();
-    bench.render("--samples 8..24 --region 0,0,12,8 --seed 7 --film f.npz -o a.exr -o a.png");
+    let written = "--film f.npz -o a.exr -o a.png --exposure -1.5";
+    bench.render(&format!(
+        "--samples 8..24 --region 0,0,12,8 --seed 7 {written}"
+    ));
     bench
         .run("info f.npz")
         .success()
@@ -38,7 +41,11 @@ fn films_and_pictures_say_the_same_of_themselves() {
     assert_eq!(film["film"]["coverage"][0][1], "8..24");
     assert!(exr["film"].is_null());
     let [film, exr, png] = [film, exr, png].map(|told| told["entries"].clone());
+    assert_eq!(png["exposure"], -1.5);
+    assert!(film["exposure"].is_null() && exr["exposure"].is_null());
     for key in [
+        "software",
+        "scene",
         "scene_hash",
         "seed",
         "samples",

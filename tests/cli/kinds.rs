@@ -48,6 +48,9 @@ fn what_is_no_scene_is_named() {
             .code(status)
             .stderr(text.clone());
         let render = format!("render {name} --backend cpu --spp 1 -o b.png");
+        bench.run(&render).code(status).stderr(text.clone());
+        // Not that its picture would overwrite the scene.
+        let render = format!("render {name} --backend cpu --spp 1");
         bench.run(&render).code(status).stderr(text);
     }
 }

@@ -206,6 +206,15 @@ fn negative_values_get_the_rule() {
             .stdout("")
             .stderr(says(&text).and(says(rule)).and(says("tip:").not()));
     }
+    for (flags, said) in [
+        ("-o a.exr --exposure 1", "--exposure is about PNG pictures"),
+        ("-o a.png --exr rgb", "--exr is about EXR pictures"),
+    ] {
+        let said = format!("error: {said}, and none is written: name ");
+        let render = format!("render box.toml --backend cpu --spp 1 {flags}");
+        bench.run(&render).code(2).stderr(says(&said));
+    }
+    bench.render("--spp 1 -o a.exr --watch w.png --exposure 1");
     // Negative values are accepted where they are valid.
     bench.render("--spp 1 --exposure -2 -o a.png");
 }

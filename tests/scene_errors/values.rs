@@ -5,7 +5,8 @@ use etendue::scene::Shape;
 
 #[test]
 fn wrong_types() {
-    let radius = "radius must be a number from 1e-15 to 1e15 (limits of f32 kernels)";
+    // Where there is no number, the reason for the limits of numbers does not matter.
+    let radius = "radius must be a number from 1e-15 to 1e15";
     for (value, found) in [
         ("\"big\"", "\"big\""),
         ("true", "true"),

@@ -48,8 +48,8 @@ pub fn bench(args: &BenchArgs) -> Result<(), Failure> {
     let read =
         |path: &PathBuf| parse::parse_str(path, &parse::read_text(path)?).map_err(Failure::Scene);
     let scenes: Vec<Scene> = args.scenes.iter().map(read).collect::<Result<_, _>>()?;
-    for path in scenes.iter().flat_map(|s| &s.row_files) {
-        files.reads("a table of a scene", path)?;
+    for file in scenes.iter().flat_map(|s| &s.row_files) {
+        files.reads("a table of a scene", &file.path)?;
     }
     let gpu = open(args)?;
     let mut bench = Bench {

@@ -85,6 +85,24 @@ pub(super) struct Keys {
 }
 
 impl Keys {
+    /// Columns that the file need not have, and the key that says the same.
+    fn said(&self) -> Vec<(&str, &str)> {
+        let mut said = Vec::new();
+        if self.radius.is_some() {
+            said.push((RADIUS, "radius"));
+        } else if self.has_radii() {
+            said.push((RADIUS, "species"));
+        }
+        let look = match (&self.material, &self.color) {
+            (Some(_), _) => Some("material"),
+            (None, Some(_)) => Some("color"),
+            (None, None) => self.has_looks().then_some("species"),
+        };
+        let looks = COLOR.into_iter().chain([MATERIAL]);
+        said.extend(looks.filter_map(|column| Some((column, look?))));
+        said
+    }
+
     /// Whether species say how large atoms are.
     pub(super) fn has_radii(&self) -> bool {
         let all = self.species.iter().flatten();
@@ -161,7 +179,7 @@ pub(super) fn surfaces(
             (true, false) => wanted.push(MATERIAL),
             _ => {}
         }
-        sheet.header(&wanted)?;
+        sheet.header(&wanted, &keys.said())?;
     }
     let one = |name: &str| sheet.find(name).start;
     let points: Vec<usize> = match is_xyz {
@@ -263,7 +281,7 @@ pub(super) fn surfaces(
 /// The lights in the text of a file, which is named at `place` of the scene file.
 pub(super) fn lights(path: &Path, text: &str, place: Place) -> Result<Vec<Light>, Wrong> {
     let mut sheet = Sheet::new(path, text, Form::Commas);
-    sheet.header(&LIGHT)?;
+    sheet.header(&LIGHT, &[])?;
     let c = LIGHT.map(|name| sheet.find(name).start);
     let mut lights = Vec::new();
     sheet.each(|row| {

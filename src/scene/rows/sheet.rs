@@ -1,8 +1,9 @@
 //! Rows of fields under named columns, as CSV and XYZ files have them, and what is wrong in one.
 
 use super::super::source::{Source, quoted, suggestion};
-use super::super::value::{FromNumber, FromVector};
+use super::super::value::{FromNumber, FromVector, without_reason};
 use super::super::{Diagnostic, Place};
+use super::xyz::count;
 use super::{Wrong, about};
 use glam::DVec3;
 use std::borrow::Cow;
@@ -76,21 +77,37 @@ impl<'a> Sheet<'a> {
         }
     }
 
-    /// Reads the first row of a CSV file, which must name the columns `wanted`, all of them and no others.
-    pub(super) fn header(&mut self, wanted: &[&str]) -> Result<(), Wrong> {
+    /// Reads the first row of a CSV file, which must name the columns `wanted`, all of them and no others. `said` are other columns, and
+    /// the key of the scene's table that says the same.
+    pub(super) fn header(&mut self, wanted: &[&str], said: &[(&str, &str)]) -> Result<(), Wrong> {
         let rule = format!("the first row must name the columns {}", wanted.join(", "));
         let Some((_, header)) = self.lines.next() else {
             return Err(self.stop(0, 0, format!("the file is empty; {rule}")));
         };
+        if !header.contains(',')
+            && let Some((c, used)) = [(';', "semicolons"), ('\t', "tabs")]
+                .into_iter()
+                .find(|(c, _)| header.trim().contains(*c))
+        {
+            let at = 1 + header.chars().take_while(|other| *other != c).count();
+            let message = format!("columns are separated by {used} here; separate them by commas");
+            return Err(self.stop(1, at, message));
+        }
         let names: Vec<&str> = header.split(',').map(str::trim).collect();
         for (k, name) in names.iter().enumerate() {
-            let message = if !wanted.contains(name) {
+            let key = said.iter().find(|(column, _)| column == name);
+            let message = if wanted.contains(name) && !names[..k].contains(name) {
+                continue;
+            } else if let Some((_, key)) = key.filter(|_| !wanted.contains(name)) {
+                format!(
+                    "column {} and the key {key} of the scene's table say the same; leave out one of them",
+                    quoted(name)
+                )
+            } else if !wanted.contains(name) {
                 let meant = suggestion(name, wanted.iter().copied());
                 format!("unknown column {}; {rule}{meant}", quoted(name))
-            } else if names[..k].contains(name) {
-                format!("duplicate column {}; {rule}, each once", quoted(name))
             } else {
-                continue;
+                format!("duplicate column {}; {rule}, each once", quoted(name))
             };
             self.wrong(1, column(header, name), message);
         }
@@ -167,8 +184,10 @@ impl<'a> Sheet<'a> {
             && self.errors.is_empty()
             && done < rows
         {
-            let message =
-                format!("the file ends after {done} of the {rows} atoms that this line announces");
+            let message = format!(
+                "this line announces {}, but the file ends after {done}",
+                count(rows)
+            );
             self.wrong(line, 1, message);
         }
         if self.errors.is_empty() {
@@ -236,6 +255,10 @@ impl<'a> Row<'a, '_> {
 
     /// What is wrong with field `k`, which `rule` follows.
     fn message(&self, k: usize, rule: &str) -> String {
+        let rule = match self.float(k) {
+            Some(_) => rule.to_owned(),
+            None => without_reason(rule),
+        };
         let (name, found) = (&self.names[k], quoted(self.fields[k]));
         format!("{name} is {found}; {name} must be {rule}")
     }

@@ -107,7 +107,7 @@ fn errors_have_their_places() {
     assert_eq!(
         faults("x,y,z,radius,material\n1,2,3,1,red\n1,two,3,1,red\n1,2,3,-1,blue\n"),
         [
-            "3:3: y is \"two\"; y must be a number from -1e15 to 1e15 (limits of f32 kernels)",
+            "3:3: y is \"two\"; y must be a number from -1e15 to 1e15",
             "4:7: radius is \"-1\"; radius must be a number from 1e-15 to 1e15 (limits of f32 kernels)"
         ]
     );
@@ -120,6 +120,13 @@ fn errors_have_their_places() {
         short,
         ["2:0: found 4 fields, but the first row names 5 columns"]
     );
+    for (header, mark) in [
+        ("x;y;z;radius;material", "semicolons"),
+        ("x\ty\tz\tradius\tmaterial", "tabs"),
+    ] {
+        let message = format!("1:2: columns are separated by {mark} here; separate them by commas");
+        assert_eq!(faults(&format!("{header}\n1;2;3;1;red\n")), [message]);
+    }
     let rule = "the first row must name the columns x, y, z, radius, material";
     assert_eq!(
         faults("x,y,z,radios,material\n"),
@@ -336,12 +343,12 @@ fn errors_in_atoms_have_their_places() {
         ),
         (
             "2\n\nO 0 0 0\n",
-            "1:1: the file ends after 1 of the 2 atoms that this line announces",
+            "1:1: this line announces 2 atoms, but the file ends after 1",
         ),
         ("9", "1:1: the file ends before the line of properties"),
         (
             "1\n\nO 0 0 0\nO 1 1 1\n",
-            "4:1: line 1 announces 1 atoms, but there are more lines",
+            "4:1: line 1 announces 1 atom, but there are more lines",
         ),
         (
             "1\n\nO 0 0\n",

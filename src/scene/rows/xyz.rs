@@ -97,9 +97,18 @@ fn only_one(sheet: &mut Sheet, line: usize, rows: usize) -> Result<(), Wrong> {
         Ok(_) => {
             "another frame begins here; the key frame chooses one: frame = 0 is the first".into()
         }
-        Err(_) => format!("line {line} announces {rows} atoms, but there are more lines"),
+        Err(_) => format!(
+            "line {line} announces {}, but there are more lines",
+            count(rows)
+        ),
     };
     Err(sheet.stop(i + 1, 1, message))
+}
+
+/// `1 atom`, `2 atoms`.
+pub(super) fn count(atoms: usize) -> String {
+    let s = if atoms == 1 { "" } else { "s" };
+    format!("{atoms} atom{s}")
 }
 
 /// The value of `Properties` in the second line of a frame. Values in quotes or braces may hold blanks, and pairs that are none.
