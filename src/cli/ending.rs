@@ -52,36 +52,56 @@ pub(super) fn say_end(
     }
 }
 
-/// A note if most of a PNG picture is white or black, with an exposure that shows it.
+/// A note if most of a PNG picture is white or black, or nothing in it is bright, with an exposure that shows it.
 pub(super) fn say_exposure(film: &Film, stops: f64) {
-    /// Linear values that are pure white and pure black in 8 bits.
-    const WHITE: f64 = 1.0;
-    const BLACK: f64 = 0.5 / 255.0 / 12.92;
-    /// Where the middle of the pixels is to lie.
-    const GREY: f64 = 0.18;
-    let gain = stops.exp2();
     let mut light = Vec::new();
     film.for_each(|_, _, e| light.push(e.mean.into_iter().fold(0.0, f64::max)));
     light.retain(|x| *x > 0.0);
+    if let Some(note) = exposure_note(&mut light, stops) {
+        say!("note: {note}");
+    }
+}
+
+/// The note about a picture of these values above 0, each the largest of a pixel.
+fn exposure_note(light: &mut [f64], stops: f64) -> Option<String> {
+    /// Linear values that are pure white and pure black in 8 bits, and that of level 40, which is dark grey.
+    const WHITE: f64 = 1.0;
+    const BLACK: f64 = 0.5 / 255.0 / 12.92;
+    const DARK: f64 = 0.021;
+    /// Where the middle of the pixels is to lie, if the brightest must not matter.
+    const GREY: f64 = 0.18;
+    /// The share of lit pixels that may be white: lamps and highlights.
+    const CLIPPED: f64 = 0.05;
+    if light.is_empty() {
+        return None;
+    }
+    light.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| light[((share * light.len() as f64) as usize).min(light.len() - 1)];
+    let gain = stops.exp2();
     let share = |is: &dyn Fn(f64) -> bool| {
         let count = light.iter().filter(|x| is(**x * gain)).count();
-        count as f64 / light.len().max(1) as f64
+        count as f64 / light.len() as f64
     };
     let (white, black) = (share(&|x| x > WHITE), share(&|x| x < BLACK));
-    let (share, what) = if white > black {
-        (white, "white")
+    // The most light, in whole stops, that leaves all but those below white.
+    let fits = (WHITE / at(1.0 - CLIPPED)).log2().floor();
+    let (what, better) = if white > 0.5 {
+        (
+            format!("{} of the lit pixels are white in the PNG", percent(white)),
+            fits,
+        )
+    } else if black > 0.5 {
+        let middle = (GREY / at(0.5)).log2().round();
+        (
+            format!("{} of the lit pixels are black in the PNG", percent(black)),
+            if fits > stops { fits } else { middle },
+        )
+    } else if at(1.0) * gain < DARK {
+        ("the PNG is dark all over".to_owned(), fits)
     } else {
-        (black, "black")
+        return None;
     };
-    if share > 0.5 {
-        let middle = light.len() / 2;
-        let (_, median, _) = light.select_nth_unstable_by(middle, f64::total_cmp);
-        let better = (GREY / *median).log2().round();
-        say!(
-            "note: {} of the lit pixels are {what} in the PNG; try --exposure {better:+}",
-            percent(share)
-        );
-    }
+    Some(format!("{what}; try --exposure {better:+}"))
 }
 
 /// If fewer paths than this share are truncated, the picture is not visibly darker, so only the report gives their number.
@@ -140,5 +160,41 @@ pub(super) fn warn_of_doubt(error: &RelativeError) {
             "warning: the stated relative error is uncertain: {doubt}; take more samples (--spp, --time)"
         ),
         None => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::exposure_note;
+
+    fn note(light: &[f64], stops: f64) -> String {
+        exposure_note(&mut light.to_vec(), stops).unwrap_or_default()
+    }
+
+    #[test]
+    fn an_exposure_shows_all_but_highlights() {
+        // Lamps alone, which are all equal: -4 stops suffice.
+        let said = note(&[12.0; 100], 0.0);
+        assert_eq!(
+            said,
+            "100.0 % of the lit pixels are white in the PNG; try --exposure -4"
+        );
+        assert_eq!(note(&[12.0; 100], -4.0), "");
+        assert!(note(&[1.0 / 16.0; 100], 9.0).ends_with("try --exposure +4"));
+        // A few highlights do not count.
+        let mut room = [3.0; 100];
+        room[7] = 900.0;
+        assert!(note(&room, 0.0).ends_with("try --exposure -2"));
+        assert_eq!(
+            note(&[0.02; 100], 0.0),
+            "the PNG is dark all over; try --exposure +5"
+        );
+        assert_eq!(note(&[0.022; 100], 0.0), "");
+        assert!(note(&[1e-5; 100], 0.0).ends_with("are black in the PNG; try --exposure +16"));
+        // Nothing fits both: the middle counts.
+        let mut both = [1e-5; 100];
+        both[..20].fill(1.0);
+        assert!(note(&both, 0.0).ends_with("are black in the PNG; try --exposure +14"));
+        assert_eq!(note(&[], 0.0), "");
     }
 }

@@ -219,6 +219,17 @@ impl Implicit {
         }
     }
 
+    /// The parameters that the formula does not use: it means the same without them.
+    pub(crate) fn idle_parameters(&self) -> impl Iterator<Item = &str> {
+        let all = self.parameters();
+        let is_idle = move |name: &&str| {
+            let others = all.iter().filter(|p| p.0 != **name);
+            let others: Vec<(String, f64)> = others.cloned().collect();
+            parse::parse(self.text(), &others).is_ok()
+        };
+        all.iter().map(|p| p.0.as_str()).filter(is_idle)
+    }
+
     /// The formula, if it is one's surface.
     pub fn formula(&self) -> Option<&Formula> {
         match &self.function {

@@ -68,6 +68,8 @@ pub fn lints(scene: &Scene, on_gpu: Option<[u32; 2]>) -> Lints {
         materials(scene),
         open::warnings(scene),
         implicit::cut(scene),
+        implicit::idle(scene),
+        eye::narrow(scene),
     ];
     // One light that is off may be meant.
     let off = if scene.lights.iter().all(|l| l.radiance == DVec3::ZERO) {
@@ -80,7 +82,10 @@ pub fn lints(scene: &Scene, on_gpu: Option<[u32; 2]>) -> Lints {
     if things <= MAX_PAIRWISE {
         picture.push(coincide::warnings(scene));
         picture.push(cross::warnings(scene));
-        picture.push(lights::covered(scene));
+        let covered = lights::covered(scene);
+        let shut_in = lights::shut_in(scene, &covered);
+        picture.push(covered);
+        picture.push(shut_in);
         picture.push(lights::unseen(scene));
         picture.push(lights::turned_away(scene));
     } else {

@@ -293,7 +293,12 @@ fn status_4_for_inaccessible_csv_files() {
     // With anything else wrong it is the content.
     fs::write(bench.path("bad.csv"), "x,y,z\n").unwrap();
     with("bad.csv");
-    bench.run("check rows.toml").code(2);
+    // Every file has a line of its own.
+    bench
+        .run("check box.toml rows.toml")
+        .code(2)
+        .stdout(says("box.toml: ok; ").and(says("\nrows.toml: 2 errors\n")))
+        .stderr(says("error: bad.csv:1: no column "));
 }
 
 /// Sends `signal` to a render that would take for ever, once its film is there; its exit status.

@@ -142,6 +142,20 @@ fn numpy_reads_the_documented_arrays() {
 /// `earlier.npz` has 10 samples a pixel of the box, and lacks the arrays that films have got since. Its samples have other values than
 /// those of this version.
 #[test]
+fn what_has_changed_in_a_scene_is_told() {
+    let bench = Bench::new();
+    bench.render("--spp 4 --film f.npz -o a.png");
+    let scene = SCENE.replace("radius   = 0.45", "radius   = 0.4");
+    fs::write(bench.path("box.toml"), format!("# mine\n{scene}")).unwrap();
+    bench
+        .run("render box.toml --backend cpu --spp 8 --film f.npz -o a.png")
+        .code(2)
+        .stderr(says(
+            "; the film's scene has `radius = 0.45` at line 32, and the file has `radius = 0.4` at line 33; give the scene of the film",
+        ));
+}
+
+#[test]
 fn a_film_of_an_earlier_version_is_read_and_not_resumed() {
     let bench = Bench::new();
     fs::copy("tests/films/earlier.npz", bench.path("f.npz")).unwrap();

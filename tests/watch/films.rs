@@ -121,6 +121,13 @@ fn what_is_no_film_is_refused() {
         .run("watch box.toml")
         .code(2)
         .stderr(says("box.toml: not a film"));
+    // For ever nothing would come there.
+    for path in ["none/f.npz", "none/", "none/films"] {
+        bench
+            .run(&format!("watch {path}"))
+            .code(4)
+            .stderr(says(&format!("error: {path}: cannot read: ")));
+    }
     bench
         .run("watch . --error 0")
         .code(2)

@@ -95,7 +95,11 @@ fn what_is_no_log_is_refused() {
     fs::write(bench.path("empty.jsonl"), "").unwrap();
     for (args, status, rule) in [
         ("plot none.jsonl -o a.svg", 4, "no such file"),
-        ("plot box.toml -o a.svg", 2, "box.toml: line 1"),
+        (
+            "plot box.toml -o a.svg",
+            2,
+            "box.toml: not a log (text, such as a scene file)",
+        ),
         (
             "plot empty.jsonl -o a.svg",
             2,

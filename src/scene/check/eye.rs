@@ -3,7 +3,7 @@
 use super::geometry::{disk_of, signed_distance, size};
 use super::{Warnings, called};
 use crate::coincidence;
-use crate::scene::{Bsdf, Scene, Shape};
+use crate::scene::{Bsdf, Place, Scene, Shape};
 
 /// How far in front of a light the point is, in radii of the light, that decides which solid it shines in.
 const BEFORE: f64 = 1e-3;
@@ -48,6 +48,24 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
     warnings
 }
 
+/// A field of view in degrees that is below this could be one in radians.
+const RADIANS: f64 = 3.0;
+
+/// A hint where the field of view may be meant in radians.
+pub(super) fn narrow(scene: &Scene) -> Warnings {
+    let vfov = scene.camera.vfov;
+    let mut warnings = Warnings::default();
+    if vfov < RADIANS {
+        warnings.add(Place::default(), || {
+            format!(
+                "vfov is {vfov}, and vfov is in degrees: the picture shows very little; if it is in radians, write {:.1}",
+                vfov.to_degrees()
+            )
+        });
+    }
+    warnings
+}
+
 /// Whether any light shines inside the solid.
 fn holds_light(scene: &Scene, solid: &Shape) -> bool {
     scene.lights.iter().any(|l| {
@@ -67,6 +85,15 @@ mod tests {
 
     fn ball(radius: f64, material: &str) -> String {
         format!("[[sphere]]\ncenter = [0,1,5]\nradius = {radius}\nmaterial = '{material}'\n")
+    }
+
+    #[test]
+    fn a_field_of_view_in_radians() {
+        let mut scene = scene(&ball(0.5, "white"));
+        assert!(super::narrow(&scene).first.is_empty());
+        scene.camera.vfov = 0.7;
+        let found = super::narrow(&scene).first;
+        assert!(found[0].1.contains("vfov is in degrees") && found[0].1.ends_with("write 40.1"));
     }
 
     #[test]

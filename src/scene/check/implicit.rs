@@ -4,6 +4,7 @@ use super::geometry::directions;
 use super::{Warnings, called};
 use crate::implicit::arithmetic::Strict;
 use crate::implicit::{Clip, Implicit};
+use crate::scene::source::quoted;
 use crate::scene::{Primitive, Scene, Shape};
 use glam::DVec3;
 
@@ -24,6 +25,20 @@ fn all(scene: &Scene) -> impl Iterator<Item = (&Primitive, &Implicit)> {
         Shape::Implicit(implicit) => Some((p, implicit.as_ref())),
         _ => None,
     })
+}
+
+/// Parameters that formulas do not use.
+pub(super) fn idle(scene: &Scene) -> Warnings {
+    let mut warnings = Warnings::default();
+    for (p, implicit) in all(scene) {
+        for parameter in implicit.idle_parameters() {
+            warnings.add(p.place(), || {
+                let name = called(p.shape.kind(), p.line);
+                format!("parameter {} of {name} is not used", quoted(parameter))
+            });
+        }
+    }
+    warnings
 }
 
 /// Formulas that have no value somewhere, and those that do not reach their level.
@@ -197,6 +212,14 @@ mod tests {
             &with("1e15 (1e14 x - 1)", ""),
             "near the end of f32"
         ));
+    }
+
+    #[test]
+    fn parameters_that_are_not_used() {
+        let keys = "parameters = { a = 2, exp_ = 1, r = 0.5 }";
+        let text = with("2a x^2 + y^2 + z^2 - 0.5 exp_", keys);
+        assert!(warned(&text, "parameter \"r\" of the implicit at line"));
+        assert!(!warned(&text, "parameter \"a\"") && !warned(&text, "\"exp_\""));
     }
 
     #[test]

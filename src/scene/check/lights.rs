@@ -65,6 +65,79 @@ pub(super) fn covered(scene: &Scene) -> Warnings {
     warnings
 }
 
+/// Light that ends within this share of what the camera sees, from top to bottom where it looks, lights nothing but a spot: that of a lamp
+/// that faces a wall from a hundredth of it.
+const NEAR: f64 = 0.1;
+/// Rays of a light, of which so many may go farther: 1 %.
+const RAYS: usize = 300;
+const FAR_RAYS: usize = 3;
+
+/// Lights whose light ends at matt surfaces right before them, such as a lamp under a ceiling that faces up. Those that are `covered` have
+/// another warning.
+pub(super) fn shut_in(scene: &Scene, covered: &Warnings) -> Warnings {
+    let matt = |p: &&Primitive| !scene.materials[p.material].bsdf.kind().is_specular();
+    let walls: Vec<&Primitive> = scene.primitives.iter().filter(matt).collect();
+    let near = NEAR * seen(scene, &walls);
+    let mut warnings = Warnings::default();
+    for l in scene.lights.iter().filter(|l| l.radiance != DVec3::ZERO) {
+        let is_covered = covered.first.iter().any(|(place, _)| *place == l.place());
+        if is_covered || hidden(scene, l).is_some() {
+            continue;
+        }
+        let start = l.normal * (2.0 * slack(l.radius));
+        let meets = |o: DVec3, d: DVec3| {
+            let hits = walls
+                .iter()
+                .filter_map(|p| Some((hit(&p.shape, o + start, d)?, *p)));
+            let hits = hits.filter(|(t, _)| *t <= near);
+            hits.min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let mut far = 0;
+        let all_near = cosine_rays(l).all(|(o, d)| {
+            far += usize::from(meets(o, d).is_none());
+            far <= FAR_RAYS
+        });
+        let Some((distance, wall)) = meets(l.center, l.normal).filter(|_| all_near) else {
+            continue;
+        };
+        let light = called("light", l.line);
+        let wall = called(wall.shape.kind(), wall.line);
+        warnings.add(l.place(), || {
+            format!(
+                "{light} faces {wall}, {distance:.3} away: hardly any of its light goes farther; its normal points to the side that shines"
+            )
+        });
+    }
+    warnings
+}
+
+/// How much the camera sees from top to bottom where it looks. `look_at` may be far beyond what is there.
+fn seen(scene: &Scene, walls: &[&Primitive]) -> f64 {
+    let camera = &scene.camera;
+    let ahead = camera.look_at - camera.eye;
+    let hits = walls
+        .iter()
+        .filter_map(|p| hit(&p.shape, camera.eye, ahead.normalize()));
+    let view = hits.fold(ahead.length(), f64::min);
+    view.min(2.0 * view * (0.5 * camera.vfov.to_radians()).tan())
+}
+
+/// Rays as a light sends them: from points that are even over it, and most along its normal.
+fn cosine_rays(l: &Light) -> impl Iterator<Item = (DVec3, DVec3)> {
+    /// Has no divisor in common with their number: each point gets another direction.
+    const STRIDE: usize = 109;
+    let normal = l.normal;
+    let points = points_on_disk(l.center, normal, l.radius, RAYS);
+    let across = points_on_disk(DVec3::ZERO, normal, 1.0, RAYS);
+    let across: Vec<DVec3> = across.collect();
+    points.enumerate().map(move |(i, point)| {
+        // Malley: points that are even over a disk are cosines over the hemisphere above.
+        let d = across[i * STRIDE % RAYS];
+        let up = (1.0 - d.length_squared()).max(0.0).sqrt();
+        (point, d + normal * up)
+    })
+}
+
 /// Lights on the other side of an opaque plane than the eye, and lights inside an opaque solid that the eye is outside of.
 pub(super) fn unseen(scene: &Scene) -> Warnings {
     let mut warnings = Warnings::default();
@@ -244,6 +317,34 @@ mod tests {
         let slab =
             "[[cylinder]]\nbase = [0,3,0]\ntop = [0,3.9998,0]\nradius = 2\nmaterial = 'red'\n";
         assert!(found(super::covered, slab));
+    }
+
+    /// The camera sees 2.9 from top to bottom.
+    #[test]
+    fn lights_that_face_what_is_right_before_them() {
+        let told = |text: &str| {
+            let scene = scene(text);
+            let covered = super::covered(&scene);
+            !super::shut_in(&scene, &covered).first.is_empty()
+        };
+        let ceiling = |y: f64, material: &str| plane(&format!("[0,{y},0]"), "[0,-1,0]", material);
+        let up = |y: f64| light(&format!("[0,{y},0]"), "[0,1,0]", "[1,1,1]");
+        let lamp = |y: f64| up(3.0) + &ceiling(3.0 + y, "white");
+        assert!(warned(&lamp(0.02), "hardly any of its light goes farther"));
+        assert!(told(&lamp(0.001)) && !told(&lamp(0.1)), "an uplight");
+        assert!(!told(&lamp(0.0004)), "that is a cover");
+        assert!(!told(&(up(3.0) + &ceiling(3.004, "glass"))));
+        assert!(!told(&lamp(0.004).replace("[0,1,0]", "[0,-1,0]")));
+        let sideways = lamp(0.004).replace("[0,1,0]", "[0,0,1]");
+        assert!(!told(&sideways), "half of it goes down");
+        let dark = lamp(0.004).replace("[1,1,1]", "[0,0,0]");
+        assert!(!told(&dark), "it emits nothing");
+        // A lid that is as wide as the lamp lets light pass beside it; a much wider one does not.
+        let lid = |radius: f64| {
+            let at = "[[disk]]\ncenter = [0,3.02,0]\nnormal = [0,1,0]";
+            up(3.0) + &format!("{at}\nradius = {radius}\nmaterial = 'white'\n")
+        };
+        assert!(!told(&lid(0.5)) && told(&lid(3.0)));
     }
 
     #[test]

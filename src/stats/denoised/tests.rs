@@ -261,7 +261,7 @@ fn what_is_not_known_is_not_stated() {
     let judged = judge(&own, &folds(&own, blur), WIDTH, doubt);
     let text = judged.statement.to_string();
     assert!(
-        text.contains("not known (the raw picture's error is in doubt: no light"),
+        text.contains("its RMS error is not known, because the raw picture's error is in doubt: no light found yet in 20 % of the picture; total light "),
         "{text}"
     );
 
