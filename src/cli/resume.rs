@@ -48,15 +48,14 @@ pub(super) fn check_same_samples(
         if !add.is_empty() {
             advice.push(format!("add {}", add.join(" ")));
         }
+        // Where flags do not help, the scene differs.
+        let mut line = String::new();
         if advice.is_empty() {
             advice.push("give the scene of the film".into());
+            let first = first_difference(&held.scene_text, &new.scene_text);
+            line = first.map_or(line, |first| format!("; {first}"));
         }
         let advice = format!("{}, or name another film", advice.join(" and "));
-        let line = match held.scene_hash == new.scene_hash {
-            true => None,
-            false => first_difference(&held.scene_text, &new.scene_text),
-        };
-        let line = line.map_or_else(String::new, |line| format!("; {line}"));
         let message =
             format!("this film can't be resumed; film and command line: {differ}{line}; {advice}");
         FileError::content(path, message).into()

@@ -29,8 +29,13 @@ pub fn man(args: &ManArgs) -> Result<(), Failure> {
             .next()
             .map_or(Ok(()), |page| write_stdout(&text(&page)));
     };
-    std::fs::create_dir_all(dir)
-        .map_err(|e| FileError::io(dir, "no such folder, and it can't be made", &e))?;
+    std::fs::create_dir_all(dir).map_err(|e| {
+        let action = match dir.exists() {
+            true => "cannot create",
+            false => "no such folder, and it can't be made",
+        };
+        FileError::io(dir, action, &e)
+    })?;
     let mut count = 0;
     for page in pages {
         let text = text(&page);

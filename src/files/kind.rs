@@ -84,7 +84,11 @@ impl FileKind {
 
     /// The same for a file that should be text.
     pub fn of_no_text(start: &[u8]) -> Option<Self> {
-        Self::of(start).filter(|kind| !matches!(kind, Self::Text | Self::Empty))
+        Self::of(start).filter(|kind| kind.is_no_text())
+    }
+
+    fn is_no_text(self) -> bool {
+        !matches!(self, Self::Text | Self::Empty)
     }
 }
 
@@ -175,10 +179,15 @@ pub fn explain(error: FileError, what: &str, wanted: Option<FileKind>) -> FileEr
 /// Refuses a file at `path` whose first bytes tell that it is no text, for one that should be `what`. A file that is not there, or no
 /// file, is for others to refuse.
 pub fn check_text(path: &Path, what: &str) -> Result<(), FileError> {
-    match start_of(path).and_then(|start| FileKind::of_no_text(&start)) {
+    match of_file(path).filter(|kind| kind.is_no_text()) {
         Some(kind) => Err(FileError::content(path, format!("not {what} ({kind})"))),
         None => Ok(()),
     }
+}
+
+/// The kind of the file at `path`, if it is known.
+pub fn of_file(path: &Path) -> Option<FileKind> {
+    FileKind::of(&start_of(path)?)
 }
 
 /// The first bytes of a file. Not of a pipe: it has given them away already, and opening it again may wait for ever.

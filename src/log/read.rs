@@ -1,7 +1,7 @@
 //! Reads logs.
 
 use super::{Event, Level, Message, Point, Start};
-use crate::files::kind::FileKind;
+use crate::files::kind;
 use crate::files::{FileError, open};
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -81,8 +81,10 @@ pub fn read(path: &Path) -> Result<Log, FileError> {
             .map_err(|e| FileError::reading(path, &e))?;
         number += 1;
         let wrong = |why: &str| {
-            if number == 1 && !line.starts_with(b"{") {
-                let kind = FileKind::of(&line).map_or("binary data".to_owned(), |k| k.to_string());
+            if number == 1
+                && !line.starts_with(b"{")
+                && let Some(kind) = kind::of_file(path)
+            {
                 return Err(FileError::content(path, format!("not a log ({kind})")));
             }
             let start = String::from_utf8_lossy(&line);
@@ -195,6 +197,16 @@ mod tests {
             (&[][..], "no\n", "line 1: \"no\""),
             (&[start("h", 0.0)][..], "{}\n", "line 2: \"{}\""),
             (&[], "\u{7f}ELF", "line 1"),
+            (
+                &[],
+                "\n[camera]\n",
+                "not a log (text, such as a scene file)",
+            ),
+            (
+                &[],
+                "PK\u{3}\u{4}",
+                "not a log (a ZIP archive, such as a film)",
+            ),
             (&[], "{\"event\":\"dance\"}\n", "dance"),
         ] {
             let error = write(before, rest).unwrap_err();

@@ -144,4 +144,7 @@ fn man_pages_know_every_command_and_flag() {
         .run("man box.toml")
         .code(4)
         .stderr(says("box.toml").and(says("cannot create")));
+    bench.run("man box.toml/man1").code(4).stderr(says(
+        "error: box.toml/man1: no such folder, and it can't be made: ",
+    ));
 }

@@ -356,7 +356,7 @@ fn errors_in_atoms_have_their_places() {
         ),
         (
             "1\n\nO 0 zero 0\n",
-            "3:5: pos is \"zero\"; pos must be a number from -1e15 to 1e15 (limits of f32 kernels)",
+            "3:5: pos is \"zero\"; pos must be a number from -1e15 to 1e15",
         ),
         (
             "1\n\n S 0 0 0\n",
