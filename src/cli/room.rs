@@ -5,7 +5,7 @@ use super::say;
 use crate::files::room;
 use crate::film::Film;
 use crate::output::{Format, store};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Bytes that a rendered pixel may take in an EXR picture: nine channels of four bytes, which compression seldom makes more of. Pixels
 /// that are not rendered compress to nothing.
@@ -39,7 +39,7 @@ pub(super) fn say_little(args: &RenderArgs, outputs: &[PathBuf], film: &Film, li
 }
 
 /// Bytes that a rendered pixel may take in the picture at `path`.
-fn picture_bytes(path: &PathBuf) -> u64 {
+fn picture_bytes(path: &Path) -> u64 {
     match Format::from_path(path) {
         Ok(Format::Png) => PNG_BYTES,
         Ok(Format::Exr) | Err(_) => EXR_BYTES,
