@@ -365,7 +365,7 @@ impl<'a, 't> Reader<'a, 't> {
             let name = shorten(word);
             format!("; a material is written [material.{name}]")
         } else if in_scene && SHAPES.contains(&word) {
-            "; there are spheres, planes, disks, cylinders and implicit surfaces, among which are boxes, tori and cones; no meshes".into()
+            "; there are spheres, planes, disks, cylinders, isosurfaces and implicit surfaces, among which are boxes, tori and cones; no meshes".into()
         } else if let ("[render]", Some((_, flag))) =
             (self.what, FLAGS.iter().find(|(name, _)| *name == word))
         {
