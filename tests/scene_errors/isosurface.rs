@@ -4,7 +4,6 @@ use etendue::files::npy::header;
 use etendue::scene::parse::parse_str;
 use etendue::settings::{Overrides, Settings};
 use std::fs;
-use std::path::Path;
 
 /// What a scene says of a surface of the array in `bytes`, in the folder that is returned too.
 fn with(bytes: &[u8], keys: &str) -> (tempfile::TempDir, Result<etendue::Scene, Vec<String>>) {
