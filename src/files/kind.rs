@@ -172,6 +172,12 @@ pub fn explain(error: FileError, what: &str, wanted: Option<FileKind>) -> FileEr
     FileError::Content { path, message }
 }
 
+/// Whether git-lfs has left a pointer in place of the file.
+pub fn is_lfs_pointer(path: &Path) -> bool {
+    let start = start_of(path);
+    start.as_deref().and_then(FileKind::of) == Some(FileKind::LfsPointer)
+}
+
 /// The first bytes of a file. Not of a pipe: it has given them away already, and opening it again may wait for ever.
 fn start_of(path: &Path) -> Option<Vec<u8>> {
     if !std::fs::metadata(path).ok()?.is_file() {

@@ -62,6 +62,7 @@ pub fn summary(done: &[Done], filter: Option<&Filter>) -> String {
         "orphaned",
         "unusable",
         "no device",
+        "no access",
         "blessed",
         "kept",
     ];
@@ -93,7 +94,7 @@ pub fn junit(done: &[Done], about: &About) -> String {
     let _ = writeln!(
         xml,
         "<testsuite name=\"etendue regress\" {counts} timestamp=\"{}\">",
-        utc(about.time).replace(' ', "T").replace("TUTC", ":00Z")
+        iso(about.time)
     );
     let adapter = format!("{}, {}", about.device.name, about.device.driver);
     let _ = writeln!(xml, "<properties>");
@@ -149,8 +150,8 @@ pub fn advice(case: &Case, unsaved: Option<&str>) -> String {
         ),
         Some(why) => format!("its film and page could not be saved: {why}"),
     };
-    let flags = case.hint();
-    format!("{evidence}; if the change is intended, re-create the golden with {flags}")
+    let command = case.bless_command();
+    format!("{evidence}; if the change is intended, re-create the golden: {command}")
 }
 
 /// The name of a folder, whatever path leads to it.
@@ -161,7 +162,10 @@ fn folder(dir: &Path) -> String {
 }
 
 fn unusable(done: &Done) -> bool {
-    matches!(done.outcome, Outcome::Unusable(_) | Outcome::NoDevice(_))
+    matches!(
+        done.outcome,
+        Outcome::Unusable(_) | Outcome::NoDevice(_) | Outcome::NoAccess(_)
+    )
 }
 
 /// Text for XML, which knows no control characters but tab and line break.
@@ -227,11 +231,23 @@ pub fn markdown(done: &[Done], filter: Option<&Filter>, about: &About) -> String
 
 /// A time to the minute: "2026-02-28 23:59 UTC".
 fn utc(time: SystemTime) -> String {
+    let ([year, month, day], [hour, minute, _]) = date(time);
+    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
+/// A time to the second, as ISO 8601 has it: "2026-02-28T23:59:59Z".
+fn iso(time: SystemTime) -> String {
+    let ([year, month, day], [hour, minute, second]) = date(time);
+    format!("{year}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+}
+
+/// Year, month and day, and hour, minute and second, in UTC.
+fn date(time: SystemTime) -> ([u64; 3], [u64; 3]) {
     let seconds = time
         .duration_since(UNIX_EPOCH)
         .unwrap_or_default()
         .as_secs();
-    let (days, minutes) = (seconds / 86_400, seconds % 86_400 / 60);
+    let (days, rest) = (seconds / 86_400, seconds % 86_400);
     // The Gregorian calendar repeats every 400 years of 146097 days. Its years here start in March, so that a leap day is a year's
     // last, and the first day is 1 March of the year 0.
     let days = days + 719_468;
@@ -247,11 +263,7 @@ fn utc(time: SystemTime) -> String {
         (year + 1, month - 9)
     };
     let year = 400 * era + year;
-    format!(
-        "{year}-{month:02}-{day:02} {:02}:{:02} UTC",
-        minutes / 60,
-        minutes % 60
-    )
+    ([year, month, day], [rest / 3600, rest / 60 % 60, rest % 60])
 }
 
 #[cfg(test)]
@@ -272,5 +284,7 @@ mod tests {
         ] {
             assert_eq!(utc(UNIX_EPOCH + Duration::from_secs(seconds)), text);
         }
+        let time = UNIX_EPOCH + Duration::from_secs(951_782_399);
+        assert_eq!(iso(time), "2000-02-28T23:59:59Z");
     }
 }

@@ -91,7 +91,7 @@ Examples:
 
 Exit status: 0 all passed; 1 one failed, or a scene or its golden is missing; 2 one can't be compared (the scene has errors, \
 or its golden is damaged or of another scene), or there is nothing to compare; 3 no usable adapter, or the device failed; 4 the \
-folder can't be read, or the results can't be written; 130, 143 or 129 interrupted, after telling the results so far.")]
+folder, a scene or a golden can't be read, or a golden or the results can't be written; 130, 143 or 129 interrupted, after telling the results so far.")]
 pub struct RegressArgs {
     /// Folder with the scenes
     pub dir: PathBuf,
