@@ -78,8 +78,11 @@ scene=$1 out=$2 tasks=$3 samples=$4
 shift 4
 number TASKS "$tasks"
 number SAMPLES "$samples"
-((tasks <= (samples + block - 1) / block)) ||
-    usage "$samples samples are $(((samples + block - 1) / block)) blocks of $block: too few for $tasks tasks"
+blocks=$(((samples + block - 1) / block))
+((tasks <= blocks)) || {
+    [ "$blocks" = 1 ] && are="1 block" || are="$blocks blocks"
+    usage "$samples samples are $are of $block: too few for $tasks tasks"
+}
 options=()
 while [ $# -gt 0 ] && [ "$1" != -- ]; do
     options+=("$1")

@@ -9,7 +9,7 @@ use super::files::{Files, Written, write_text};
 use super::layers;
 use super::looks::measured;
 use super::progress::{Progress, clock, point};
-use super::saver::{Saver, longest_call};
+use super::saver::{self, Saver, longest_call};
 use super::say;
 use super::signals::Signals;
 use super::stages::Stages;
@@ -98,7 +98,7 @@ fn render_before(
     }
     let old = load_film(args)?;
     let args = &match &old {
-        Some((film, _)) => plan::as_film(args, film)?,
+        Some((film, held)) => plan::as_film(args, film, held)?,
         None => args.clone(),
     };
     let settings = match &old {
@@ -122,7 +122,7 @@ fn render_before(
     let (mut film, mut provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
             check_same_samples(args, path, &held, &new)?;
-            plan::check_bounds(path, &film, bounds)?;
+            plan::check_bounds(path, &film, bounds, &args.region)?;
             plan::check_adaptive(args, path, &film, &regions)?;
             (film, held)
         }
@@ -132,6 +132,9 @@ fn render_before(
             (film, new)
         }
     };
+    if film.coverage.is_empty() || provenance.slice.is_some() {
+        provenance.slice = args.samples.as_ref().map(|s| [s.start, s.end]);
+    }
     let samples = plan::samples(args, &settings, &regions, &film.coverage)?;
 
     let least = REPLICATES as u64 * settings.round();
@@ -220,7 +223,20 @@ fn render_before(
     let mut written = Written::default();
     if let Some(path) = args.film.as_ref().filter(|_| tally.counters.paths > 0) {
         stages.begin(format!("saving {}", path.display()));
-        written.note(path, store::save(path, &film, &provenance));
+        let saved = store::save(path, &film, &provenance);
+        let rescued = match &saved {
+            Ok(()) => None,
+            Err(_) => saver::rescue(path, &film, &provenance),
+        };
+        written.note(path, saved);
+        if let Some(other) = rescued {
+            say!(
+                "warning: {}: the film can't be saved there; it is in {}, with all samples",
+                path.display(),
+                other.display()
+            );
+            written.note(&other, Ok::<(), Failure>(()));
+        }
     }
     stages.end();
     let reason = match ended {

@@ -21,6 +21,8 @@ pub struct Side {
     pub covered: Vec<bool>,
     /// Its noise, if known.
     pub noise: Option<Noise>,
+    /// Whether its file ends at white: it holds no value above 1.
+    pub clipped: bool,
     /// The metadata in its header, by key.
     pub origin: Vec<(String, String)>,
 }
@@ -105,6 +107,7 @@ impl Side {
                 unit: Unit::Sample,
                 replicates: provenance.replicates,
             }),
+            clipped: false,
             origin: entries(&provenance)
                 .into_iter()
                 .map(|(key, value)| (key.to_owned(), value.to_string()))
@@ -165,6 +168,7 @@ impl Side {
             rgb: exr.rgb.iter().map(|p| p.map(f64::from)).collect(),
             covered,
             noise,
+            clipped: false,
             origin: exr.attributes.into_iter().collect(),
         };
         picture.not_empty().map_err(wrong)
@@ -178,6 +182,7 @@ impl Side {
             rgb: png.rgb,
             covered: png.covered,
             noise: None,
+            clipped: true,
             origin: png.texts,
         };
         picture
@@ -193,6 +198,7 @@ impl Side {
             rgb: image.rgb,
             covered: image.covered,
             noise: None,
+            clipped: image.clipped,
             origin: Vec::new(),
         };
         picture
