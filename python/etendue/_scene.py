@@ -20,7 +20,8 @@ FILE = re.compile(r"""^(\s*file\s*=\s*)("[^"\\]*"|'[^']*')""", re.MULTILINE)
 @contextlib.contextmanager
 def scene_file(scene: Scene) -> typing.Iterator[tuple[pathlib.Path, dict[str, str]]]:
     """A file that holds the scene, and what messages shall call it."""
-    if isinstance(scene, os.PathLike) or (isinstance(scene, str) and "\n" not in scene):
+    is_line = isinstance(scene, str) and "\n" not in scene and ("=" not in scene or os.path.exists(scene))
+    if isinstance(scene, os.PathLike) or is_line:
         yield pathlib.Path(scene), {}
         return
     if not isinstance(scene, (str, typing.Mapping)):
