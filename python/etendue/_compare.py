@@ -105,7 +105,9 @@ def compare(
         for k, picture in enumerate(pictures):
             renamed.update(called(picture, name if len(pictures) == 1 else f"{name}[{k}]"))
     if any(len(pictures) > 1 for pictures in sides.values()):
-        given = [word for name, pictures in sides.items() for word in (f"--{name}", *map(file_of, pictures))]
+        given: list[str | os.PathLike[str]] = []
+        for name, pictures in sides.items():
+            given += [f"--{name}", *map(file_of, pictures)]
     else:
         given = ["--", *(file_of(pictures[0]) for pictures in sides.values())]
     flags = {"alpha": alpha, "max-flip": max_flip, "max-relative-rmse": max_relative_rmse, "html": html}

@@ -133,7 +133,8 @@ def test_compare_tells_light_from_noise(room, film, tmp_path):
     with pytest.raises(etendue.InputError, match="^a has 24 x 16 pixels, but b has 8 x 8"):
         etendue.compare(film, etendue.render(room, spp=16, size=(8, 8), backend="cpu"))
     renders = [etendue.render(room, spp=16, seed=seed, backend="cpu") for seed in range(8)]
-    dim = [etendue.render({**room, "light": [{**room["light"][0], "radiance": [4, 4, 4]}]}, spp=16, seed=k, backend="cpu") for k in (8, 9, 10, 11)]
+    room["light"][0]["radiance"] = [4, 4, 4]
+    dim = [etendue.render(room, spp=16, seed=seed, backend="cpu") for seed in range(8, 12)]
     assert not etendue.compare(renders[:4], dim) and not etendue.compare(brighter, dim)
     assert not etendue.compare(renders[:4], renders[4:]).identical
     with pytest.raises(ValueError, match="^a is empty"):
