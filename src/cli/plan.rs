@@ -75,18 +75,8 @@ pub fn as_film(args: &RenderArgs, film: &Film, held: &Provenance) -> Result<Rend
         return Err(Failure::Input(message.into()));
     }
     args.adaptive |= film.pilot.is_some();
-    if let (Some([first, end]), None) = (held.slice, &args.samples) {
-        let flag = match (args.spp, args.rays) {
-            (Some(n), _) => Some(format!("--spp {n}")),
-            (_, Some(n)) => Some(format!("--rays {n}")),
-            _ => None,
-        };
-        match flag {
-            Some(flag) => super::say!(
-                "warning: this film is a slice, samples {first}..{end}; {flag} asks for others, so it may no longer fit its neighbours"
-            ),
-            None => args.samples = Some(first..end),
-        }
+    if args.samples.is_none() && args.spp.or(args.rays).is_none() {
+        args.samples = held.slice.map(|[first, end]| first..end);
     }
     if args.region.is_empty() {
         args.region = held_regions(film);

@@ -132,6 +132,7 @@ fn render_before(
             (film, new)
         }
     };
+    let left_slice = provenance.slice.filter(|_| args.samples.is_none());
     if film.coverage.is_empty() || provenance.slice.is_some() {
         provenance.slice = args.samples.as_ref().map(|s| [s.start, s.end]);
     }
@@ -195,6 +196,11 @@ fn render_before(
     if !args.talk.quiet {
         say_start(args, &settings, &chosen, &job, &film)?;
         say_other_adapters(args, &provenance, chosen.engine.device());
+    }
+    if let Some([first, end]) = left_slice {
+        say!(
+            "warning: this film is a slice, samples {first}..{end}; --spp and --rays ask for others, so it may no longer fit its neighbours"
+        );
     }
 
     // Render.

@@ -76,9 +76,9 @@ fn a_slice_is_resumed_within_its_range() {
                 "render box.toml --backend cpu --film d.npz -o a.png {flag}"
             ))
             .success()
-            .stderr(says(&format!(
-                "warning: this film is a slice, samples 0..8; {flag} asks for others"
-            )));
+            .stderr(says(
+                "warning: this film is a slice, samples 0..8; --spp and --rays ask for others",
+            ));
         assert_eq!(bench.film("d.npz").coverage.samples(), (12, 12));
     }
     // One that was interrupted goes on to its end, and a larger range can be asked for.
