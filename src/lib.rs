@@ -34,6 +34,7 @@
 
 mod coincidence;
 pub mod compare;
+mod date;
 pub mod regress;
 pub mod scene;
 

@@ -31,6 +31,9 @@ pub struct Provenance {
     pub scene_text: String,
     /// The settings, which together with the scene determine the samples.
     pub settings: Settings,
+    /// The sample numbers that were asked for, where they are a slice of a picture's: the first, and one more than the last.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slice: Option<[u64; 2]>,
     /// Samples of a covered pixel on average.
     #[serde(serialize_with = "count_or_mean")]
     pub samples: f64,
@@ -82,6 +85,7 @@ impl Provenance {
             scene_hash: hash_of(scene, settings),
             scene_text: scene_text.into(),
             settings: settings.clone(),
+            slice: None,
             samples: 0.0,
             replicates: 0,
             devices: Vec::new(),
@@ -122,6 +126,8 @@ impl Provenance {
 
     /// Adds the work of a film that is merged into this one. Call [`describe`](Self::describe) for the sum afterwards.
     pub fn absorb(&mut self, other: &Self) {
+        // The sum is a slice no longer.
+        self.slice = None;
         for used in &other.devices {
             self.add_use(used.clone());
         }
@@ -263,6 +269,7 @@ pub(crate) mod tests {
                 integrator: Integrator::Path,
                 light_paths: true,
             },
+            slice: None,
             samples: 0.0,
             replicates: 0,
             devices: Vec::new(),

@@ -10,7 +10,7 @@ import tempfile
 import typing
 
 from . import _program
-from ._film import Film, file_of
+from ._film import Film, called, file_of
 
 CHANNELS = ("red", "green", "blue")
 
@@ -71,9 +71,13 @@ class Verdict:
         return f"<Verdict: {self}>"
 
 
+Picture = typing.Union[Film, str, "os.PathLike[str]"]
+"""A film, or the path of a picture."""
+
+
 def compare(
-    a: Film | str | os.PathLike[str],
-    b: Film | str | os.PathLike[str],
+    a: Picture | typing.Sequence[Picture],
+    b: Picture | typing.Sequence[Picture],
     *,
     alpha: float | None = None,
     max_flip: float | None = None,
@@ -83,7 +87,8 @@ def compare(
     """Whether two pictures are the same up to their noise.
 
     Args:
-        a: a film or the path of a picture; the reference where the order matters.
+        a: a film or the path of a picture; the reference where the order matters. Several independent renders of it, by any
+            program, are a list: their spread is its noise.
         b: the other.
         alpha: the probability that two pictures of the same scene are called different; 0.001 by default.
         max_flip: the largest mean FLIP allowed, 0 to 1.
@@ -94,13 +99,34 @@ def compare(
         InputError: they cannot be compared.
         FileError: a file cannot be read or written.
     """
+    sides = {name: side(name, pictures) for name, pictures in (("a", a), ("b", b))}
+    renamed: dict[str, str] = {}
+    for name, pictures in sides.items():
+        for k, picture in enumerate(pictures):
+            renamed.update(called(picture, name if len(pictures) == 1 else f"{name}[{k}]"))
+    if any(len(pictures) > 1 for pictures in sides.values()):
+        given: list[str | os.PathLike[str]] = []
+        for name, pictures in sides.items():
+            given += [f"--{name}", *map(file_of, pictures)]
+    else:
+        given = ["--", *(file_of(pictures[0]) for pictures in sides.values())]
     flags = {"alpha": alpha, "max-flip": max_flip, "max-relative-rmse": max_relative_rmse, "html": html}
     arguments = [f"--{flag}={value}" for flag, value in flags.items() if value is not None]
     with tempfile.TemporaryDirectory(prefix="etendue-") as folder:
         report = pathlib.Path(folder, "report.json")
         arguments += [f"--report={report}", "--progress=none"]
-        _program.run(["compare", *arguments, "--", file_of(a), file_of(b)], good=(0, 1))
-        return read(json.loads(report.read_text(encoding="utf-8")))
+        _program.run(["compare", *arguments, *given], good=(0, 1), renamed=renamed)
+        return read(json.loads(_program.rename(report.read_text(encoding="utf-8"), renamed)))
+
+
+def side(name: str, pictures: Picture | typing.Sequence[Picture]) -> list[Picture]:
+    """The pictures of one side."""
+    if isinstance(pictures, (Film, str, os.PathLike)):
+        return [pictures]
+    found = list(pictures)
+    if not found:
+        raise ValueError(f"{name} is empty; it must be a film, a path, or a list of them")
+    return found
 
 
 def read(report: dict[str, typing.Any]) -> Verdict:

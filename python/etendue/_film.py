@@ -42,6 +42,8 @@ class Film:
     bounds: tuple[int, int, int, int]
     """The part of the picture that the arrays hold: x0, y0, x1, y1, half open."""
 
+    _has_name = True
+
     path: pathlib.Path
     """The file that holds it. A film without a name of its own has a temporary one, which goes with the object."""
 
@@ -156,6 +158,7 @@ def temporary_folder() -> typing.Iterator[pathlib.Path]:
 
 def keep(film: Film, folder: pathlib.Path) -> Film:
     """The film, whose folder goes when it goes."""
+    film._has_name = folder not in film.path.parents
     weakref.finalize(film, shutil.rmtree, folder, ignore_errors=True)
     return film
 
@@ -163,6 +166,11 @@ def keep(film: Film, folder: pathlib.Path) -> Film:
 def file_of(source: Film | str | os.PathLike[str]) -> pathlib.Path:
     """The file of a film or a picture."""
     return source._file() if isinstance(source, Film) else pathlib.Path(source)
+
+
+def called(source: Film | str | os.PathLike[str], name: str) -> dict[str, str]:
+    """What messages call a film whose file has no name of its own."""
+    return {os.fspath(source.path): name} if isinstance(source, Film) and not source._has_name else {}
 
 
 def merge(films: typing.Iterable[Film | str | os.PathLike[str]]) -> Film:
@@ -176,7 +184,13 @@ def merge(films: typing.Iterable[Film | str | os.PathLike[str]]) -> Film:
     """
     if isinstance(films, (Film, str, os.PathLike)):
         raise TypeError("merge takes a list of films")
+    films = list(films)
+    if not films:
+        raise ValueError("merge takes at least one film, and the list is empty")
+    renamed: dict[str, str] = {}
+    for k, film in enumerate(films, 1):
+        renamed.update(called(film, f"film {k} of {len(films)}"))
     with temporary_folder() as folder:
         out = folder / "merged.npz"
-        _program.run(["merge", out, *map(file_of, films)])
+        _program.run(["merge", out, *map(file_of, films)], renamed=renamed)
         return keep(Film(out), folder)

@@ -6,6 +6,7 @@ import importlib.metadata
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -169,13 +170,32 @@ def rename(text: str, names: typing.Mapping[str, str]) -> str:
     return text
 
 
+# Flags of the command line that have another name here.
+RENAMED = {"region": "regions"}
+
+
+def in_python(text: str) -> str:
+    """What the program says, with the arguments of Python in place of flags.
+
+    >>> in_python("invalid value '-1' for '--spp <N>': expected; raise it with --max-depth N (--spp-a)")
+    "invalid value '-1' for spp=: expected; raise it with max_depth=N (spp_a=)"
+    """
+
+    def argument(match: re.Match[str]) -> str:
+        return f"{RENAMED.get(match[1], match[1].replace('-', '_'))}="
+
+    text = re.sub(r"\n+For more information, try '--help'\.", "", text)
+    text = re.sub(r"'--([a-z][a-z-]*)(?: <[^>']*>)?'", argument, text)
+    return re.sub(r"(?<![\w-])--([a-z][a-z-]*)(?: (?=[A-Z0-9]))?", argument, text)
+
+
 def failure(status: int, messages: list[str]) -> Error:
     """The exception for an exit status, with the program's own message."""
     if status < 0:
         return Error(f"etendue was killed by {signal.Signals(-status).name}", status)
     first = next((k for k, line in enumerate(messages) if line.startswith("error: ")), 0)
     text = "\n".join(line.removeprefix("error: ") for line in messages[first:]).strip()
-    return KINDS.get(status, Error)(text or f"etendue ended with status {status}", status)
+    return KINDS.get(status, Error)(in_python(text) or f"etendue ended with status {status}", status)
 
 
 def warn(messages: list[str]) -> None:
@@ -186,4 +206,4 @@ def warn(messages: list[str]) -> None:
         level, frame = level + 1, frame.f_back
     for line in messages:
         if line.startswith("warning: "):
-            warnings.warn(line.removeprefix("warning: "), RenderWarning, stacklevel=level)
+            warnings.warn(in_python(line.removeprefix("warning: ")), RenderWarning, stacklevel=level)

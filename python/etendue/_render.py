@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 import os
 import pathlib
+import re
 import typing
 
 from . import _program, _progress
@@ -17,10 +19,10 @@ def render(
     spp: int | None = None,
     error: float | str | None = None,
     time: float | str | None = None,
-    samples: tuple[int, int] | None = None,
+    samples: tuple[int, int] | range | str | None = None,
     film: str | os.PathLike[str] | None = None,
-    size: tuple[int, int] | None = None,
-    regions: typing.Iterable[tuple[int, int, int, int]] = (),
+    size: tuple[int, int] | str | None = None,
+    regions: typing.Iterable[tuple[int, int, int, int]] | tuple[int, int, int, int] = (),
     adaptive: bool = False,
     light: str | typing.Iterable[str] | None = None,
     integrator: str | None = None,
@@ -38,14 +40,15 @@ def render(
 
     Args:
         scene: the path of a scene file, the text of one, or its tables as a dict. Text has line breaks, a path has none.
+            One line is text too if it has an equals sign, and no file has this name.
             Files of rows that text and dicts name lie relative to the working directory.
         spp: stop at so many samples per pixel, those in `film` included.
         error: stop at this relative error: 0.02 or "2%".
         time: stop after so long: seconds, or text such as "10m".
-        samples: only the samples with these numbers: the first, and one more than the last.
+        samples: only the samples with these numbers: a range, or the first and one more than the last.
         film: a film to create, or to resume. It is saved now and then, and at Ctrl-C.
-        size: width and height in pixels instead of the scene's.
-        regions: only these parts of the picture: x0, y0, x1, y1, half open.
+        size: width and height in pixels instead of the scene's, or text such as "640x480".
+        regions: only these parts of the picture, or this one: x0, y0, x1, y1, half open.
         adaptive: put samples where the noise is.
         light: the light to keep: "emitted", "direct", "indirect", or several of them.
         integrator: "path" or "whitted".
@@ -66,8 +69,8 @@ def render(
         "spp": spp,
         "error": error,
         "time": f"{time}s" if isinstance(time, (int, float)) else time,
-        "samples": samples and "..".join(map(str, samples)),
-        "size": size and "x".join(map(str, size)),
+        "samples": None if samples is None else samples_flag(samples),
+        "size": None if size is None else size_flag(size),
         "light": light if light is None or isinstance(light, str) else ",".join(light),
         "integrator": integrator,
         "light-paths": light_paths,
@@ -80,7 +83,7 @@ def render(
         "threads": threads,
     }
     arguments = [f"--{flag}={value}" for flag, value in flags.items() if value is not None]
-    arguments += [f"--region={','.join(map(str, region))}" for region in regions]
+    arguments += [f"--region={region}" for region in region_flags(regions)]
     if adaptive:
         arguments.append("--adaptive")
     with temporary_folder() as folder:
@@ -93,3 +96,64 @@ def render(
             _program.run(["render", *arguments, "--", path], bar=bar, renamed=renamed)
         picture.unlink()
         return keep(Film(out), folder)
+
+
+def numbers(value: typing.Any, count: int) -> list[int] | None:
+    """So many whole numbers, if the value is that."""
+    try:
+        found = [operator.index(n) for n in value]
+    except TypeError:
+        return None
+    return found if len(found) == count else None
+
+
+def size_flag(size: typing.Any) -> str:
+    """A size for the command line.
+
+    >>> size_flag((640, 480)), size_flag("640x480")
+    ('640x480', '640x480')
+    """
+    pair = numbers(size, 2)
+    if isinstance(size, str) and re.fullmatch(r"\d+x\d+", size):
+        return size
+    if pair is None:
+        raise ValueError(f'size is {size!r}; it must be a width and a height: (640, 480) or "640x480"')
+    return "x".join(map(str, pair))
+
+
+def samples_flag(samples: typing.Any) -> str:
+    """Sample numbers for the command line.
+
+    >>> samples_flag((0, 64)), samples_flag(range(0, 64)), samples_flag("0..64")
+    ('0..64', '0..64', '0..64')
+    """
+    if isinstance(samples, str) and re.fullmatch(r"\d+\.\.\d+", samples):
+        return samples
+    if isinstance(samples, range):
+        pair = [samples.start, samples.stop] if samples.step == 1 else None
+    else:
+        pair = numbers(samples, 2)
+    if pair is None:
+        raise ValueError(f"samples is {samples!r}; it must be the first number and one more than the last: (0, 64) or range(0, 64)")
+    return "..".join(map(str, pair))
+
+
+def region_flags(regions: typing.Any) -> list[str]:
+    """Regions, or one of them, for the command line.
+
+    >>> region_flags((0, 0, 10, 10)), region_flags([(0, 0, 10, 10), "1,2,3,4"])
+    (['0,0,10,10'], ['0,0,10,10', '1,2,3,4'])
+    """
+    regions = list(regions) if not isinstance(regions, str) else [regions]
+    if numbers(regions, 4) is not None:
+        regions = [regions]
+    flags = []
+    for region in regions:
+        if isinstance(region, str) and re.fullmatch(r"\d+(,\d+){3}", region):
+            flags.append(region)
+            continue
+        four = numbers(region, 4)
+        if four is None:
+            raise ValueError(f"a region is {region!r}; it must be four whole numbers of pixels: (x0, y0, x1, y1)")
+        flags.append(",".join(map(str, four)))
+    return flags

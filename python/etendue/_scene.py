@@ -20,7 +20,7 @@ FILE = re.compile(r"""^(\s*file\s*=\s*)("[^"\\]*"|'[^']*')""", re.MULTILINE)
 @contextlib.contextmanager
 def scene_file(scene: Scene) -> typing.Iterator[tuple[pathlib.Path, dict[str, str]]]:
     """A file that holds the scene, and what messages shall call it."""
-    if isinstance(scene, os.PathLike) or (isinstance(scene, str) and "\n" not in scene):
+    if isinstance(scene, os.PathLike) or (isinstance(scene, str) and is_path(scene)):
         yield pathlib.Path(scene), {}
         return
     if not isinstance(scene, (str, typing.Mapping)):
@@ -31,6 +31,11 @@ def scene_file(scene: Scene) -> typing.Iterator[tuple[pathlib.Path, dict[str, st
         # Files of rows lie relative to the working directory. The line stays where it is, for messages.
         path.write_text(FILE.sub(lambda m: m[1] + basic(os.path.abspath(m[2][1:-1])), text), encoding="utf-8")
         yield path, {os.fspath(path): "scene"}
+
+
+def is_path(text: str) -> bool:
+    """Whether a string is the path of a scene, and not its text."""
+    return "\n" not in text and ("=" not in text or os.path.exists(text))
 
 
 def dumps(tables: typing.Mapping[str, typing.Any]) -> str:

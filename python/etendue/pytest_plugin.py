@@ -29,6 +29,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
+WORD = r"(?:'(?:[^']|'\\'')*'|\S+)"
+
+# What `etendue regress` says re-creates a golden.
+COMMAND = re.compile(rf"etendue regress {WORD} --bless --scene {WORD}")
+
+
 class Golden:
     """Compares scenes with their golden pictures."""
 
@@ -91,15 +97,18 @@ class Golden:
         """The word of ``etendue regress`` for the scene, and what it says."""
         given = [f"--{flag}={value}" for flag, value in options.items() if value is not None]
         arguments: list[str | os.PathLike[str]] = ["regress", *flags, *given, "--progress=none", f"--scene={path.stem}", "--", path.parent]
-        done = _program.run(arguments, good=(0, 1, 2))
-        found = re.match(rf"\s*(\w+)  {re.escape(path.stem)}: ", done.output)
+        done = _program.run(arguments, good=(0, 1, 2, *_program.KINDS))
+        found = re.match(rf"\s*(\w+(?: \w+)?)  {re.escape(path.stem)}: ", done.output)
         if found is None:
             raise _program.failure(done.status, done.messages)
         # The last line counts scenes.
         lines = done.output.splitlines()[:-1]
         text = "\n".join(line.strip() if k == 0 else line for k, line in enumerate(lines))
-        # The flags of the command line have another name here.
-        return found[1], re.sub(r"--bless --scene (?:'(?:[^']|'\\'')*'|\S+)", "pytest --force-regen", text)
+        # The command has another name here.
+        text = COMMAND.sub("pytest --force-regen", text)
+        if found[1] in ("no device", "no access"):
+            raise _program.KINDS[done.status](text, done.status)
+        return found[1], text
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@
 # A task that is killed or preempted and requeued resumes its own film. Running the same command again resumes all tasks;
 # finished ones end at once. Slurm sends SIGTERM before it kills a task, and the task then saves its film. Without SIGTERM
 # at most a minute is lost (--checkpoint). To get SIGTERM before the time limit: --signal=B:TERM@60.
+# OUT holds one division: other TASKS or SAMPLES need another OUT.
 # The merge job waits for all tasks, and is cancelled if one fails (its log says why). Run the command again after fixing the
 # cause. OUT/whole.npz is re-created each time from the films in OUT/parts.
 set -euo pipefail
@@ -78,8 +79,11 @@ scene=$1 out=$2 tasks=$3 samples=$4
 shift 4
 number TASKS "$tasks"
 number SAMPLES "$samples"
-((tasks <= (samples + block - 1) / block)) ||
-    usage "$samples samples are $(((samples + block - 1) / block)) blocks of $block: too few for $tasks tasks"
+blocks=$(((samples + block - 1) / block))
+((tasks <= blocks)) || {
+    [ "$blocks" = 1 ] && are="1 block" || are="$blocks blocks"
+    usage "$samples samples are $are of $block: too few for $tasks tasks"
+}
 options=()
 while [ $# -gt 0 ] && [ "$1" != -- ]; do
     options+=("$1")
@@ -91,6 +95,27 @@ etendue=$(command -v "${ETENDUE:-etendue}") ||
     usage "${ETENDUE:-etendue} not found: put it on the path, or set ETENDUE"
 command -v sbatch >/dev/null || usage "sbatch not found: run this on a Slurm cluster"
 "$etendue" check "$scene" >/dev/null
+# What is wrong with a flag is said here, not by every task. The last flag ends the command before it renders.
+for flag in "$@"; do
+    case $flag in
+    --spp* | --rays* | --time* | --error* | --samples* | --adaptive | --film*)
+        usage "$flag can't be a RENDER FLAG: each task has a film and samples of its own"
+        ;;
+    esac
+done
+"$etendue" render "$scene" --samples "0..$samples" --film part.npz --output part.png --progress plain --threads 1 "$@" --help >/dev/null
+# The films of another division overlap with these.
+if [ -d "$out/parts" ]; then
+    declare -A planned=()
+    for ((task = 0; task < tasks; task++)); do
+        range "$out" "$tasks" "$samples" "$task"
+        planned[$part.npz]=1
+    done
+    for film in "$out"/parts/*.npz; do
+        [ ! -e "$film" ] || [ -n "${planned[$film]-}" ] ||
+            usage "$film is not a part of $samples samples in $tasks tasks: give OUT's own TASKS and SAMPLES, or another OUT"
+    done
+fi
 
 mkdir -p "$out/parts" "$out/log"
 # Jobs start in another folder, so they need absolute paths.

@@ -158,6 +158,7 @@ mod tests {
                 unit: crate::compare::Unit::Sample,
                 replicates: 4,
             }),
+            clipped: false,
             origin: Vec::new(),
         }
     }

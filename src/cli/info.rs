@@ -185,6 +185,10 @@ impl Info {
         for (key, value) in &self.entries {
             // What is computed has sixteen digits, of which a reader wants four.
             match value.parse::<f64>() {
+                _ if key == "scene_text" => {
+                    let lines = value.lines().count();
+                    line(key, &format!("{lines} lines (--json has them)"));
+                }
                 Ok(x) if x.fract() != 0.0 => line(key, &four_digits(x)),
                 _ => line(key, value),
             }

@@ -46,28 +46,38 @@ pub fn regions(args: &RenderArgs, settings: &Settings) -> Result<Vec<Rect>, Fail
     Ok(args.region.clone())
 }
 
-/// Refuses regions outside the part of the picture that the film holds.
-pub fn check_bounds(path: &Path, film: &Film, bounds: Rect) -> Result<(), Failure> {
+/// Refuses regions outside the part of the picture that the film holds. `typed` are those of the command line.
+pub fn check_bounds(path: &Path, film: &Film, bounds: Rect, typed: &[Rect]) -> Result<(), Failure> {
     if film.bounds.union(&bounds) == film.bounds {
         return Ok(());
     }
+    let selected = match typed {
+        [] => bounds.to_string(),
+        _ => {
+            let each = typed.iter().map(Rect::to_string);
+            each.collect::<Vec<_>>().join(" and ")
+        }
+    };
     Err(Failure::Input(format!(
-        "{}: this film holds the region {} of the picture, but the command line selects {}; render the rest into \
-         another film and merge the two",
+        "{}: this film holds the region {} of the picture, but the command line selects {selected}; render the rest \
+         into another film and merge the two",
         path.display(),
-        film.bounds,
-        bounds
+        film.bounds
     )))
 }
 
-/// The arguments, completed with what a film that is resumed brings along: its regions, and whether it is adaptive.
-pub fn as_film(args: &RenderArgs, film: &Film) -> Result<RenderArgs, Failure> {
+/// The arguments, completed with what a film that is resumed brings along: its regions, its slice of the samples, and whether it is
+/// adaptive.
+pub fn as_film(args: &RenderArgs, film: &Film, held: &Provenance) -> Result<RenderArgs, Failure> {
     let mut args = args.clone();
     if film.pilot.is_some() && args.samples.is_some() {
         let message = "--samples can't be used with an adaptive film";
         return Err(Failure::Input(message.into()));
     }
     args.adaptive |= film.pilot.is_some();
+    if args.samples.is_none() && args.spp.or(args.rays).is_none() {
+        args.samples = held.slice.map(|[first, end]| first..end);
+    }
     if args.region.is_empty() {
         args.region = held_regions(film);
     }
@@ -227,11 +237,11 @@ pub fn start(
 
 /// The stop conditions in few words: `256 spp`, `until error 2 % or 10 min`.
 pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
-    if let Some(range) = &args.samples {
-        return Ok(format!("samples {}..{}", range.start, range.end));
-    }
     let wanted = wanted(args, settings)?;
-    let samples = (wanted < MAX_SAMPLES).then(|| format!("{wanted} spp"));
+    let samples = match &args.samples {
+        Some(range) => Some(format!("samples {}..{}", range.start, range.end)),
+        None => (wanted < MAX_SAMPLES).then(|| format!("{wanted} spp")),
+    };
     let error = args
         .error
         .map(|e| format!("error {}", percent_without_zeros(e)));
@@ -240,7 +250,7 @@ pub fn ends(args: &RenderArgs, settings: &Settings) -> Result<String, Failure> {
         .map(|t| clock(t.as_secs_f64()).replace(".0 s", " s"));
     let conditions: Vec<String> = [samples, error, time].into_iter().flatten().collect();
     let text = match conditions.split_last() {
-        Some((last, [])) if wanted < MAX_SAMPLES => last.clone(),
+        Some((last, [])) if wanted < MAX_SAMPLES || args.samples.is_some() => last.clone(),
         Some((last, [])) => format!("until {last}"),
         Some((last, others)) => format!("until {} or {last}", others.join(", ")),
         None => String::new(),

@@ -161,14 +161,10 @@ pub(super) fn engine(
 pub(super) fn run_one(args: &RegressArgs, case: &Case, signals: &Signals) -> Option<Done> {
     let begun = Instant::now();
     let engine = |world: &World, settings: &Settings| engine(args, world, settings);
-    let limits = Limits {
-        alpha: args.alpha,
-        ..Limits::default()
-    };
     let (outcome, pictures) = if args.bless && case.scene {
-        case.bless(&engine, &wanted(args), &limits, &signals.stop)?
+        case.bless(&engine, &wanted(args), &limits(args), &signals.stop)?
     } else {
-        case.run(&engine, &limits, &args.layers, &signals.stop)?
+        case.run(&engine, &limits(args), &args.layers, &signals.stop)?
     };
     Some(Done {
         case: case.clone(),
@@ -202,7 +198,7 @@ fn accept(
         if let Some(film) = films.get(&case.name) {
             done.push(Done {
                 case: case.clone(),
-                outcome: case.accept(film, &wanted(args)),
+                outcome: case.accept(film, &wanted(args), &limits(args)),
                 pictures: Vec::new(),
                 time: begun.elapsed(),
             });
@@ -223,6 +219,13 @@ pub(super) fn wanted(args: &RegressArgs) -> Wanted {
         most_samples: args.max_spp,
         alpha: args.alpha,
         layers: args.layers.clone(),
+    }
+}
+
+pub(super) fn limits(args: &RegressArgs) -> Limits {
+    Limits {
+        alpha: args.alpha,
+        ..Limits::default()
     }
 }
 
@@ -269,10 +272,10 @@ fn tell(args: &RegressArgs, done: &[Done], filter: Option<&Filter>) -> Result<()
         write_stdout(&list)?;
     }
     for d in done {
-        if let Outcome::Blessed(golden) = &d.outcome
-            && let Some(warning) = golden.warning(&wanted(args))
-        {
-            say!("warning: {}: {warning}", d.case.name);
+        if let Outcome::Blessed(golden) = &d.outcome {
+            for warning in golden.warnings(&wanted(args)) {
+                say!("warning: {}: {warning}", d.case.name);
+            }
         }
     }
     Ok(())
@@ -301,6 +304,8 @@ fn verdict(done: &[Done]) -> Result<(), Failure> {
     let any = |what: fn(&Outcome) -> bool| done.iter().any(|d| what(&d.outcome));
     if any(|o| matches!(o, Outcome::NoDevice(_))) {
         Err(Failure::Said(3))
+    } else if any(|o| matches!(o, Outcome::NoAccess(_))) {
+        Err(Failure::Said(4))
     } else if any(|o| matches!(o, Outcome::Unusable(_))) {
         Err(Failure::Said(2))
     } else if done.iter().any(|d| !d.outcome.good()) {

@@ -9,7 +9,7 @@ use super::files::{Files, Written, write_text};
 use super::layers;
 use super::looks::measured;
 use super::progress::{Progress, clock, point};
-use super::saver::{Saver, longest_call};
+use super::saver::{self, Saver, longest_call};
 use super::say;
 use super::signals::Signals;
 use super::stages::Stages;
@@ -95,7 +95,7 @@ fn render_before(
     }
     let old = resume::film(args)?;
     let args = &match &old {
-        Some((film, _)) => plan::as_film(args, film)?,
+        Some((film, held)) => plan::as_film(args, film, held)?,
         None => args.clone(),
     };
     let settings = match &old {
@@ -119,7 +119,7 @@ fn render_before(
     let (mut film, mut provenance) = match (old, &args.film) {
         (Some((film, held)), Some(path)) => {
             resume::check_same_samples(args, path, &held, &new)?;
-            plan::check_bounds(path, &film, bounds)?;
+            plan::check_bounds(path, &film, bounds, &args.region)?;
             plan::check_adaptive(args, path, &film, &regions)?;
             (film, held)
         }
@@ -129,6 +129,10 @@ fn render_before(
             (film, new)
         }
     };
+    let left_slice = provenance.slice.filter(|_| args.samples.is_none());
+    if film.coverage.is_empty() || provenance.slice.is_some() {
+        provenance.slice = args.samples.as_ref().map(|s| [s.start, s.end]);
+    }
     let samples = plan::samples(args, &settings, &regions, &film.coverage)?;
 
     let least = REPLICATES as u64 * settings.round();
@@ -190,6 +194,11 @@ fn render_before(
         say_start(args, &settings, &chosen, &job, &film)?;
         say_other_adapters(args, &provenance, chosen.engine.device());
     }
+    if let Some([first, end]) = left_slice {
+        say!(
+            "warning: this film is a slice, samples {first}..{end}; --spp and --rays ask for others, so it may no longer fit its neighbours"
+        );
+    }
 
     // Render.
     let device = chosen.engine.device().clone();
@@ -217,7 +226,20 @@ fn render_before(
     let mut written = Written::default();
     if let Some(path) = args.film.as_ref().filter(|_| tally.counters.paths > 0) {
         stages.begin(format!("saving {}", path.display()));
-        written.note(path, store::save(path, &film, &provenance));
+        let saved = store::save(path, &film, &provenance);
+        let rescued = match &saved {
+            Ok(()) => None,
+            Err(_) => saver::rescue(path, &film, &provenance),
+        };
+        written.note(path, saved);
+        if let Some(other) = rescued {
+            say!(
+                "warning: {}: the film can't be saved there; it is in {}, with all samples",
+                path.display(),
+                other.display()
+            );
+            written.note(&other, Ok::<(), Failure>(()));
+        }
     }
     stages.end();
     let reason = match ended {

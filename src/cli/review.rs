@@ -1,11 +1,11 @@
 //! `etendue regress --review`: shows what changed, old beside new, and asks before it replaces a golden.
 
 use super::args::RegressArgs;
-use super::regress::{engine, lines, run_one, wanted};
+use super::regress::{engine, limits, lines, run_one, wanted};
 use super::say;
 use super::signals::Signals;
-use crate::compare::Side;
-use crate::files::{FileError, atomic};
+use crate::compare::{Side, html};
+use crate::files::{FileError, atomic, kind};
 use crate::reference::CpuEngine;
 use crate::regress::report::{self, About, Done};
 use crate::regress::{Candidate, Case, LABELS, Outcome, Trouble};
@@ -58,13 +58,18 @@ pub(super) fn review(args: &RegressArgs, cases: &[Case], signals: &Signals) -> V
 /// What could become the golden of a case, after showing it. `None` if there is nothing to ask.
 fn candidate(args: &RegressArgs, one: &mut Done, signals: &Signals) -> Option<Candidate> {
     let case = one.case.clone();
-    let made = match &one.outcome {
+    let (outcome, limits) = (&one.outcome, limits(args));
+    let old = Side::read(&case.golden_path()).ok();
+    let made = match outcome {
         Outcome::Failed { unsaved: None, .. } => {
             Candidate::left(&case, &case.actual_path(), &wanted(args)).map(Some)
         }
+        // Nobody knows whether it still passes.
+        Outcome::Unusable(_) if kind::is_lfs_pointer(&case.golden_path()) => return None,
         Outcome::Failed { .. } | Outcome::New | Outcome::Unusable(_) => {
             let engine = |world: &World, settings: &Settings| engine(args, world, settings);
-            Candidate::render(&case, &engine, &wanted(args), &signals.stop)
+            let (wanted, stop) = (wanted(args), &signals.stop);
+            Candidate::render(&case, &engine, &wanted, old.as_ref(), stop)
         }
         _ => return None,
     };
@@ -77,26 +82,47 @@ fn candidate(args: &RegressArgs, one: &mut Done, signals: &Signals) -> Option<Ca
             return None;
         }
     };
+    let mut told = lines(one);
     // A comparison has left its own page.
     if !matches!(one.outcome, Outcome::Failed { unsaved: None, .. }) {
-        let [golden, now] = LABELS;
-        let old = Side::read(&case.golden_path()).ok();
-        one.pictures = old
-            .map(|old| (golden, old))
-            .into_iter()
-            .chain([(now, candidate.picture().clone())])
+        let now = candidate.picture();
+        let changes = old
+            .as_ref()
+            .map(|old| (old, candidate.changes(old, &limits)));
+        let page = match &changes {
+            Some((old, Ok(comparison))) => {
+                told += &comparison.report();
+                Some(html::page(old, now, LABELS, comparison))
+            }
+            Some((old, Err(why))) => {
+                told += &format!("{why}\n");
+                for line in candidate.changed_text(old) {
+                    told += &format!("{line}\n");
+                }
+                None
+            }
+            None => None,
+        };
+        let labels = LABELS.into_iter();
+        let pictures = [old.clone(), Some(now.clone())];
+        one.pictures = labels
+            .zip(pictures)
+            .filter_map(|(label, picture)| Some((label, picture?)))
             .collect();
-        if let Err(e) = show(args, one) {
+        let page = page.unwrap_or_else(|| index(args, one));
+        if let Err(e) = write(&case, &page) {
             say!("warning: the page could not be written: {e}");
         }
     }
-    say!("{}", lines(one).trim_end());
+    let mut told = told.lines().filter(|line| !line.trim().is_empty());
+    say!("{}", told.next().unwrap_or_default());
+    told.for_each(|line| say!("          {}", line.trim_start()));
     say!("          old beside new: {}", case.report_path().display());
     Some(candidate)
 }
 
-/// Writes a page with the pictures of one case.
-fn show(args: &RegressArgs, one: &Done) -> Result<(), FileError> {
+/// A page with the pictures of one case.
+fn index(args: &RegressArgs, one: &Done) -> String {
     let gpu = backend::open(args.backend, args.adapter.as_deref());
     let gpu = gpu.ok().and_then(|(gpu, _)| gpu);
     let about = About {
@@ -105,8 +131,14 @@ fn show(args: &RegressArgs, one: &Done) -> Result<(), FileError> {
     };
     let path = one.case.report_path();
     let folder = path.parent().unwrap_or(&one.case.dir);
+    report::index(std::slice::from_ref(one), None, &about, folder)
+}
+
+/// Writes the page of a case.
+fn write(case: &Case, page: &str) -> Result<(), FileError> {
+    let path = case.report_path();
+    let folder = path.parent().unwrap_or(&case.dir);
     std::fs::create_dir_all(folder).map_err(|e| FileError::io(folder, "cannot create", &e))?;
-    let page = report::index(std::slice::from_ref(one), None, &about, folder);
     atomic::replace(&path, |f| io::Write::write_all(f, page.as_bytes()))
 }
 

@@ -2,6 +2,7 @@
 
 use super::args::RenderArgs;
 use super::progress::Progress;
+use crate::date::utc;
 use crate::engine::DeviceInfo;
 use crate::files::FileError;
 use crate::film::Film;
@@ -10,7 +11,8 @@ use crate::output::write_png;
 use crate::provenance::Provenance;
 use crate::render;
 use crate::run::{self, Tally};
-use std::time::{Duration, Instant};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
 
 /// Default time between two checkpoints.
 const CHECKPOINT: Duration = Duration::from_secs(60);
@@ -20,6 +22,19 @@ const WATCH: Duration = Duration::from_secs(2);
 
 /// Writing the `--watch` picture takes at most 1/20 of the time: large ones are written less often.
 const WATCH_SHARE: u32 = 20;
+
+/// A file that still can't be written, for the same reason, is warned of again after this time.
+const WARN_AGAIN: Duration = Duration::from_secs(3600);
+
+/// Saves a film that can't be saved under its name in the working directory, or else in the one for temporary files. Its new name is
+/// that of no other file.
+pub fn rescue(path: &Path, film: &Film, provenance: &Provenance) -> Option<PathBuf> {
+    let stem = path.file_stem()?.to_string_lossy();
+    let name = format!("{stem}.rescued-{}.npz", std::process::id());
+    let folders = [PathBuf::new(), std::env::temp_dir()];
+    let mut files = folders.into_iter().map(|folder| folder.join(&name));
+    files.find(|file| !file.exists() && store::save(file, film, provenance).is_ok())
+}
 
 /// Writes each file at its interval.
 pub struct Saver<'a> {
@@ -87,6 +102,8 @@ struct Timer {
     took: Duration,
     /// When `is_due` was last called.
     asked: Instant,
+    /// The last warning, until a save succeeds.
+    warned: Option<(String, Instant)>,
 }
 
 impl Timer {
@@ -97,6 +114,7 @@ impl Timer {
             began: now,
             took: Duration::ZERO,
             asked: now,
+            warned: None,
         }
     }
 
@@ -107,12 +125,28 @@ impl Timer {
     }
 
     fn done(&mut self, began: Instant, result: Result<(), FileError>, progress: &Progress) {
-        if let Err(e) = result {
-            progress.say(&format!("warning: {e}"));
+        match result {
+            Ok(()) => self.warned = None,
+            Err(e) => self.warn(e.to_string(), progress),
         }
         self.began = began;
         self.asked = Instant::now();
         self.took = began.elapsed();
+    }
+}
+
+impl Timer {
+    /// Warns once of each reason, and again after a long time: a full disk may stay full for a week.
+    fn warn(&mut self, why: String, progress: &Progress) {
+        let told = self.warned.as_ref();
+        if told.is_some_and(|(told, when)| *told == why && when.elapsed() < WARN_AGAIN) {
+            return;
+        }
+        let now = utc(SystemTime::now());
+        progress.say(&format!(
+            "warning: {why} ({now}); it is tried again until the end"
+        ));
+        self.warned = Some((why, Instant::now()));
     }
 }
 

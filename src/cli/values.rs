@@ -65,7 +65,16 @@ pub fn relative_error(text: &str) -> Result<f64, String> {
     if value > 0.0 && value <= 1.0 {
         Ok(value)
     } else {
-        Err("expected a relative error of more than 0 and at most 1 (100%)".into())
+        const RULE: &str = "expected a relative error of more than 0 and at most 1 (100%)";
+        Err(RULE.to_owned() + &percent_hint(text))
+    }
+}
+
+/// What to write, if a number above 1 was meant as percent.
+fn percent_hint(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(x) if x > 1.0 && x <= 100.0 => format!("; for {text} percent write {text}%"),
+        _ => String::new(),
     }
 }
 
@@ -76,7 +85,7 @@ pub fn change(text: &str) -> Result<f64, String> {
     if change > 0.0 && change <= 1.0 {
         Ok(change)
     } else {
-        Err(RULE.into())
+        Err(RULE.to_owned() + &percent_hint(text))
     }
 }
 
@@ -84,7 +93,10 @@ pub fn change(text: &str) -> Result<f64, String> {
 pub fn share(text: &str) -> Result<f64, String> {
     match limit(text) {
         Ok(x) if x <= 1.0 => Ok(x),
-        _ => Err("expected a number from 0 to 1, such as 0.02 or 2%".into()),
+        _ => {
+            const RULE: &str = "expected a number from 0 to 1, such as 0.02 or 2%";
+            Err(RULE.to_owned() + &percent_hint(text))
+        }
     }
 }
 
@@ -263,6 +275,11 @@ mod tests {
         assert_eq!(relative_error("2%"), Ok(0.02));
         for bad in ["", "%", "0", "-1%", "101%", "2", "nan", "inf%", "two"] {
             assert!(relative_error(bad).is_err(), "{bad}");
+        }
+        for of in [relative_error, change, share] {
+            let told = of("5").unwrap_err();
+            assert!(told.ends_with("; for 5 percent write 5%"), "{told}");
+            assert!(!of("101").unwrap_err().contains("percent write"));
         }
     }
 

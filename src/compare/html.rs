@@ -301,7 +301,8 @@ fn sensitivity(comparison: &Comparison) -> String {
 fn origin(a: &Side, b: &Side) -> String {
     let mut keys: Vec<&str> = Vec::new();
     for (key, _) in a.origin.iter().chain(&b.origin) {
-        if !keys.contains(&key.as_str()) {
+        // The text of a scene is no line of a table.
+        if !keys.contains(&key.as_str()) && key != "scene_text" {
             keys.push(key);
         }
     }

@@ -60,6 +60,8 @@ pub struct Comparison {
     pub notes: Vec<String>,
     /// Whether every pixel is the same to the bit.
     pub identical: bool,
+    /// Whether both hold the same samples, as a film and its picture do: of one scene and seed, and equal but for rounding.
+    pub same_samples: bool,
     /// What texts call the two pictures.
     pub(crate) labels: [&'static str; 2],
 }
@@ -138,6 +140,7 @@ pub fn compare(a: &Side, b: &Side, limits: &Limits) -> Result<Comparison, Incomp
         layers: Vec::new(),
         notes: notes(a, b),
         identical,
+        same_samples: same_samples(a, b),
         labels: LABELS,
     })
 }
@@ -162,6 +165,21 @@ fn check(a: &Side, b: &Side) -> Result<(), Incomparable> {
     Ok(())
 }
 
+/// Whether both are of one scene and seed, and equal but for the rounding of files.
+fn same_samples(a: &Side, b: &Side) -> bool {
+    let agree = |key: &str| a.origin(key).is_some_and(|x| b.origin(key) == Some(x));
+    let close = |(x, y): (&f64, &f64)| (x - y).abs() <= verdict::ROUNDING * x.abs().max(y.abs());
+    let channels = a.rgb.as_flattened().iter().zip(b.rgb.as_flattened());
+    agree("scene_hash") && agree("seed") && channels.into_iter().all(close)
+}
+
+/// How many pixels a picture that ends at white shows white where the other one is brighter.
+fn clipped_away(clipped: &Side, other: &Side) -> usize {
+    let pairs = clipped.rgb.iter().zip(&other.rgb);
+    let is = |(p, q): &(&[f64; 3], &[f64; 3])| (0..3).any(|c| p[c] >= 1.0 && q[c] > 1.0);
+    pairs.filter(is).count()
+}
+
 fn notes(a: &Side, b: &Side) -> Vec<String> {
     let both = |key: &str| Some((a.origin(key)?, b.origin(key)?));
     let mut notes = Vec::new();
@@ -170,6 +188,22 @@ fn notes(a: &Side, b: &Side) -> Vec<String> {
         notes.push(format!(
             "{} states the noise of its luminance alone: that is tested, and a change of colour without one of brightness is not seen",
             picture.name
+        ));
+    }
+    let clipped = match (a.clipped, b.clipped) {
+        (true, false) => Some((a, b)),
+        (false, true) => Some((b, a)),
+        _ => None,
+    };
+    if let Some((picture, other)) = clipped
+        && let pixels @ 1.. = clipped_away(picture, other)
+    {
+        notes.push(format!(
+            "{} ends at white, as 8-bit pictures do: {pixels} of {} pixels are white in it and brighter in {}, and count as different; \
+             compare EXR files with EXR files",
+            picture.name,
+            picture.rgb.len(),
+            other.name
         ));
     }
     if let Some((x, y)) = both("scene_hash")

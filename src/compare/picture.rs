@@ -5,6 +5,7 @@ use crate::film::Film;
 use crate::output::store;
 use crate::output::{Kind, Pixels, entries, read_exr, read_image, read_png};
 use crate::provenance::Provenance;
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
@@ -21,6 +22,8 @@ pub struct Side {
     pub covered: Vec<bool>,
     /// Its noise, if known.
     pub noise: Option<Noise>,
+    /// Whether its file ends at white: it holds no value above 1.
+    pub clipped: bool,
     /// The metadata in its header, by key.
     pub origin: Vec<(String, String)>,
 }
@@ -126,6 +129,7 @@ impl Side {
                 unit: Unit::Sample,
                 replicates: provenance.replicates,
             }),
+            clipped: false,
             origin: entries(&provenance)
                 .into_iter()
                 .map(|(key, value)| (key.to_owned(), value.to_string()))
@@ -151,6 +155,9 @@ impl Side {
             None if exr.moments.is_some() => vec![true; exr.rgb.len()],
             None => exr.alpha.iter().map(|&a| a > 0.0).collect(),
         };
+        if let Some(samples) = &exr.samples {
+            check_samples(&exr.attributes, samples).map_err(wrong)?;
+        }
         let noise = match (exr.error, exr.samples, exr.moments) {
             (Some(error), Some(samples), _) if replicates >= 2 => Some(Noise {
                 error: error.iter().map(|e| e.map(f64::from)).collect(),
@@ -183,6 +190,7 @@ impl Side {
             rgb: exr.rgb.iter().map(|p| p.map(f64::from)).collect(),
             covered,
             noise,
+            clipped: false,
             origin: exr.attributes.into_iter().collect(),
         };
         picture.not_empty().map_err(wrong)
@@ -196,6 +204,7 @@ impl Side {
             rgb: png.rgb,
             covered: png.covered,
             noise: None,
+            clipped: true,
             origin: png.texts,
         };
         picture
@@ -211,6 +220,7 @@ impl Side {
             rgb: image.rgb,
             covered: image.covered,
             noise: None,
+            clipped: image.clipped,
             origin: Vec::new(),
         };
         picture
@@ -225,4 +235,26 @@ impl Side {
             Err("no pixel has samples, so there is nothing to compare".into())
         }
     }
+}
+
+/// Refuses a header whose number of samples is not that of the pixels that have any, on average.
+fn check_samples(header: &BTreeMap<String, String>, samples: &[u32]) -> Result<(), String> {
+    // Headers of other programs mean other things.
+    let told = header
+        .get("samples")
+        .filter(|_| header.contains_key("scene_hash"));
+    let Some(told) = told else {
+        return Ok(());
+    };
+    let covered = samples.iter().filter(|n| **n > 0).count();
+    let sum: f64 = samples.iter().map(|n| f64::from(*n)).sum();
+    let mean = sum / covered.max(1) as f64;
+    // A header has f32, and so have counts above 2^24.
+    let is_mean = |told: f64| (told - mean).abs() <= 1e-6 * mean;
+    if told.parse().is_ok_and(is_mean) {
+        return Ok(());
+    }
+    Err(format!(
+        "damaged: its header says samples = {told}, but its pixels have {mean} on average"
+    ))
 }

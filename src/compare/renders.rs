@@ -21,6 +21,7 @@ impl Side {
         for path in others {
             let next = Self::read(path)?;
             check(path, &sum, &next)?;
+            sum.clipped |= next.clipped;
             for (i, moved) in moved.iter_mut().enumerate() {
                 let d = [0, 1, 2].map(|c| next.rgb[i][c] - base[i][c]);
                 for (moved, d) in moved.iter_mut().zip([d[0], d[1], d[2], luminance(d)]) {

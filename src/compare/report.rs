@@ -9,6 +9,7 @@ use serde::Serialize;
 struct Report<'a> {
     same: bool,
     identical: bool,
+    same_samples: bool,
     /// The verdict in one sentence.
     sentence: String,
     /// Where the difference is, as a table of text; empty without one.
@@ -51,6 +52,7 @@ impl Comparison {
         let report = Report {
             same: self.same(),
             identical: self.identical,
+            same_samples: self.same_samples,
             sentence: self.sentence(),
             table: self.findings_text(),
             verdict: self.verdict.as_ref(),

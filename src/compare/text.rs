@@ -24,6 +24,9 @@ impl Comparison {
         let exceeded = self.exceeded.join("; ");
         match &self.verdict {
             Some(v) if self.identical && v.same() => "bit-identical".into(),
+            Some(v) if self.same_samples && v.same() && exceeded.is_empty() => {
+                "the same samples, equal but for the rounding of files: no evidence that two renders are equal".into()
+            }
             Some(v) if exceeded.is_empty() => verdict_sentence(v),
             Some(v) if v.same() => format!(
                 "different by the given limits ({exceeded}), which count noise as a difference; without them: {}",

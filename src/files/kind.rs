@@ -190,6 +190,11 @@ pub fn of_file(path: &Path) -> Option<FileKind> {
     FileKind::of(&start_of(path)?)
 }
 
+/// Whether git-lfs has left a pointer in place of the file.
+pub fn is_lfs_pointer(path: &Path) -> bool {
+    of_file(path) == Some(FileKind::LfsPointer)
+}
+
 /// The first bytes of a file. Not of a pipe: it has given them away already, and opening it again may wait for ever.
 fn start_of(path: &Path) -> Option<Vec<u8>> {
     if !std::fs::metadata(path).ok()?.is_file() {

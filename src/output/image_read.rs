@@ -16,6 +16,8 @@ pub struct Image {
     pub rgb: Vec<[f64; 3]>,
     /// Whether alpha is more than 0.
     pub covered: Vec<bool>,
+    /// Whether its numbers are whole, and end at white: it holds no value above 1.
+    pub clipped: bool,
 }
 
 /// Reads a picture, of the kind that its first bytes tell. Floating-point values count as linear, whole numbers as sRGB. The error is
@@ -50,6 +52,7 @@ pub fn read_image(path: &Path) -> Result<Image, FileError> {
         size: [width, height],
         rgb,
         covered,
+        clipped: !linear,
     })
 }
 

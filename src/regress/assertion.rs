@@ -47,7 +47,7 @@ pub fn assert_golden(path: &Path, film: &Film, provenance: &Provenance) {
     let mut provenance = provenance.clone();
     provenance.describe(film);
     if std::env::var_os(BLESS).is_some() {
-        if let Err(e) = golden::write(path, film, &provenance, &Extra::default()) {
+        if let Err(e) = golden::write(path, film, &provenance, Extra::default()) {
             panic!("{e}");
         }
         return;

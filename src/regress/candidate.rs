@@ -3,8 +3,8 @@
 use super::golden::{
     self, Bless, Facts, MOST_SAMPLES, NO_EVIDENCE, Wanted, no_evidence, smallest_change,
 };
-use super::{Case, MakeEngine, Trouble, layers, render, short, text};
-use crate::compare::Side;
+use super::{Case, LABELS, MakeEngine, Trouble, changes, layers, render, short, text};
+use crate::compare::{Comparison, Incomparable, Limits, Side, compare};
 use crate::files::FileError;
 use crate::film::coverage::Rect;
 use crate::film::{Film, REPLICATES};
@@ -36,11 +36,13 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// Renders the case's scene with just enough samples. `None` if `stop` was set.
+    /// Renders the case's scene with just enough samples. `None` if `stop` was set. To stand beside the golden `old`, it has another
+    /// seed, and the golden's size if the scene still has its shape and no size is wanted.
     pub fn render(
         case: &Case,
         engine: &MakeEngine,
         wanted: &Wanted,
+        old: Option<&Side>,
         stop: &AtomicBool,
     ) -> Result<Option<Self>, Trouble> {
         let path = case.scene_path();
@@ -50,11 +52,18 @@ impl Candidate {
             let height = (f64::from(WIDTH) * f64::from(h) / f64::from(w)).round();
             [WIDTH, (height as u32).max(1)]
         };
+        let has_shape = |[gw, gh]: &[u32; 2]| {
+            let height = f64::from(*gw) * f64::from(h) / f64::from(w);
+            height.round().max(1.0) == f64::from(*gh)
+        };
+        let olds = old.map(|old| old.size).filter(has_shape);
         let size = wanted
             .size
+            .or(olds)
             .unwrap_or(if w > WIDTH { small(w, h) } else { [w, h] });
         let overrides = Overrides {
             size: Some(size),
+            seed: old.and_then(golden::other_seed),
             ..Overrides::default()
         };
         let settings = Settings::resolve(&scene, &overrides);
@@ -82,7 +91,7 @@ impl Candidate {
             samples = whole_rounds(samples as f64 * factor);
         };
         if power >= NO_EVIDENCE && !provenance.black {
-            return Err(no_evidence(&path.display().to_string(), "raise --max-spp").into());
+            return Err(no_evidence(&path.display().to_string()).into());
         }
         Ok(Some(Self {
             scene,
@@ -97,19 +106,21 @@ impl Candidate {
     /// The film that a failed run left. It must be one of the case's scene as it is now.
     pub fn left(case: &Case, path: &Path, wanted: &Wanted) -> Result<Self, Trouble> {
         let (source, scene) = read(case)?;
-        let (film, provenance) = store::load(path).map_err(text)?;
+        let (film, provenance) = store::load(path)?;
         let name = path.display().to_string();
         let picture = Side::from_film(name.clone(), &film, &provenance)?;
         if picture.covered.contains(&false) {
             return Err(format!("{name}: some of its pixels have no samples").into());
         }
         let facts = Facts::read(&picture)?;
-        let remedy = "it was rendered before the scene was changed";
-        facts.check_settings(&scene, &name, remedy)?;
+        let cause = "it was rendered before the scene was changed";
+        facts
+            .check_settings(&scene, &name)
+            .map_err(|why| format!("{why}; {cause}"))?;
         let now = Provenance::new(&scene, source, &facts.settings(&scene)).scene_hash;
         if now != facts.scene_hash {
             return Err(format!(
-                "{name} is of another scene than {} (hash {} and {}): {remedy}",
+                "{name} is of another scene than {} (hash {} and {}): {cause}",
                 case.scene_path().display(),
                 short(&facts.scene_hash),
                 short(&now)
@@ -132,34 +143,70 @@ impl Candidate {
         &self.picture
     }
 
+    /// What a comparison with the golden says, or why that golden is none of this picture.
+    pub(super) fn against(
+        &self,
+        case: &Case,
+        golden: &Side,
+        wanted: &Wanted,
+        limits: &Limits,
+    ) -> Result<Comparison, String> {
+        let facts = Facts::read(golden)?;
+        if facts.scene_hash != self.provenance.scene_hash {
+            return Err("it is of another scene or has other settings".into());
+        }
+        golden::check_evidence(golden, limits.alpha, self.provenance.black)?;
+        let mut comparison = compare(golden, &self.picture, limits).map_err(text)?;
+        comparison.labels = LABELS;
+        let path = case.golden_path();
+        let all = [&wanted.layers[..], &layers::held(&path)].concat();
+        comparison.layers = layers::differing(&path, &self.scene, &self.provenance.settings, &all)?;
+        Ok(comparison)
+    }
+
+    /// What differs from a golden of the scene as it was before: in the pictures, and as notes in the text.
+    pub fn changes(&self, old: &Side, limits: &Limits) -> Result<Comparison, Incomparable> {
+        let mut comparison = compare(old, &self.picture, limits)?;
+        comparison.labels = LABELS;
+        comparison.notes = self.changed_text(old);
+        Ok(comparison)
+    }
+
+    /// What differs in the text of the scene, in lines.
+    pub fn changed_text(&self, old: &Side) -> Vec<String> {
+        changes::of_text(old.origin(golden::SCENE_TEXT), &self.provenance.scene_text)
+    }
+
     /// Makes it the case's golden.
     pub fn put(&self, case: &Case, wanted: &Wanted) -> Result<Bless, Trouble> {
         let golden = case.golden_path();
         let folder = case.dir.join("golden");
-        std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+        std::fs::create_dir_all(&folder)
+            .map_err(|e| FileError::io(&folder, "cannot create", &e))?;
         // A golden keeps its layers, whoever makes it again.
         let layers = [&wanted.layers[..], &layers::held(&golden)].concat();
         let beside = layers::made(&self.scene, &self.provenance.settings, &layers);
-        golden::write(&golden, &self.film, &self.provenance, &beside).map_err(text)?;
+        golden::write(&golden, &self.film, &self.provenance, beside)?;
         case.clear();
-        let file = std::fs::metadata(&golden).map_err(|e| format!("{}: {e}", golden.display()))?;
+        let file =
+            std::fs::metadata(&golden).map_err(|e| FileError::io(&golden, "cannot read", &e))?;
         Ok(Bless {
             size: self.picture.size,
             samples: self.samples,
             power: self.power,
             short: self.power > wanted.power(),
             bytes: file.len(),
+            doubt: self.provenance.relative_error_doubt.clone(),
             replaced: None,
         })
     }
 }
 
 /// The text of the case's scene, and the scene.
-fn read(case: &Case) -> Result<(String, Scene), Trouble> {
+pub(super) fn read(case: &Case) -> Result<(String, Scene), Trouble> {
     let path = case.scene_path();
-    let source = parse::read_text(&path).map_err(text)?;
-    let scene =
-        parse::parse_str(&path, &source).map_err(|e| parse::ReadError::Invalid(e).to_string())?;
+    let source = parse::read_text(&path)?;
+    let scene = parse::parse_str(&path, &source).map_err(parse::ReadError::Invalid)?;
     Ok((source, scene))
 }
 

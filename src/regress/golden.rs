@@ -2,10 +2,10 @@
 
 use super::layers;
 use crate::compare::{Side, verdict::verdict};
-use crate::files::FileError;
-use crate::film::Film;
+use crate::files::{FileError, kind};
+use crate::film::{Film, REPLICATES};
 use crate::layers::Layer;
-use crate::output::{ExrChannels, Extra, write_exr_with};
+use crate::output::{ExrChannels, Extra, Value, write_exr_with};
 use crate::provenance::{Provenance, integrator_name, light_name};
 use crate::scene::Scene;
 use crate::settings::{Integrator, LightParts, Overrides, Settings};
@@ -69,6 +69,8 @@ pub struct Bless {
     pub short: bool,
     /// Bytes of the file.
     pub bytes: u64,
+    /// Why its stated error may be far from the true one.
+    pub doubt: Option<String>,
     /// Why the golden that was there before was not kept.
     pub replaced: Option<String>,
 }
@@ -87,6 +89,9 @@ impl fmt::Display for Bless {
                 "detects a change of the whole picture's brightness by {power:.2} %"
             )?;
         }
+        if let Some(doubt) = &self.doubt {
+            write!(f, "; its stated error is in doubt: {doubt}")?;
+        }
         match &self.replaced {
             Some(why) => write!(f, "; the golden before it: {why}"),
             None => Ok(()),
@@ -95,31 +100,57 @@ impl fmt::Display for Bless {
 }
 
 impl Bless {
-    /// A warning if comparisons detect only larger changes than `wanted`.
-    pub fn warning(&self, wanted: &Wanted) -> Option<String> {
-        self.short.then(|| {
+    /// Warnings: comparisons detect only larger changes than `wanted`; its error is in doubt.
+    pub fn warnings(&self, wanted: &Wanted) -> Vec<String> {
+        let short = self.short.then(|| {
             format!(
                 "comparisons with this golden will detect a change of the whole picture's brightness by {:.2} % or more, but \
                  --power asks for {:.2} %; raise --max-spp",
                 100.0 * self.power,
                 100.0 * wanted.power()
             )
-        })
+        });
+        let doubt = self.doubt.as_ref().map(|doubt| {
+            format!(
+                "the stated error of this golden is in doubt: {doubt}; more samples help (a smaller --power, a larger --max-spp)"
+            )
+        });
+        short.into_iter().chain(doubt).collect()
     }
 }
 
-/// Writes a golden. The time that it took is left out, so that the same picture is the same file.
+/// Longest text of a scene, in bytes, that a golden keeps: goldens stay small.
+const KEPT_TEXT: usize = 1 << 16;
+
+/// The attribute that has it.
+pub(super) const SCENE_TEXT: &str = "scene_text";
+
+/// Refuses to replace a golden that git-lfs has not fetched: nobody has seen whether it still passes.
+pub(super) fn check_fetched(path: &Path) -> Result<(), FileError> {
+    if kind::is_lfs_pointer(path) {
+        let why = "a git-lfs pointer, not the golden itself; run `git lfs pull` first";
+        return Err(FileError::content(path, why));
+    }
+    Ok(())
+}
+
+/// Writes a golden, with the text of its scene. The time that it took is left out, so that the same picture is the same file.
 pub(super) fn write(
     path: &Path,
     film: &Film,
     provenance: &Provenance,
-    beside: &Extra,
+    mut beside: Extra,
 ) -> Result<(), FileError> {
     let untimed = Provenance {
         seconds: 0.0,
         ..provenance.clone()
     };
-    write_exr_with(path, film, &untimed, ExrChannels::All, beside)
+    check_fetched(path)?;
+    if provenance.scene_text.len() <= KEPT_TEXT {
+        let text = Value::Text(provenance.scene_text.clone());
+        beside.entries.push((SCENE_TEXT, text));
+    }
+    write_exr_with(path, film, &untimed, ExrChannels::All, &beside)
 }
 
 /// A golden is no evidence if comparisons with it do not detect a change of the whole picture's brightness by so much: it holds
@@ -132,10 +163,10 @@ pub(super) fn smallest_change(picture: &Side, alpha: f64) -> f64 {
     seen.first().map_or(f64::INFINITY, |s| s.change)
 }
 
-pub(super) fn no_evidence(name: &str, remedy: &str) -> String {
+pub(super) fn no_evidence(name: &str) -> String {
     format!(
         "{name}: the picture holds next to no light beside its noise: a golden of it is no evidence, since even a doubling of its \
-         brightness would pass; {remedy}"
+         brightness would pass; it needs more samples (--max-spp)"
     )
 }
 
@@ -144,10 +175,7 @@ pub(super) fn check_evidence(golden: &Side, alpha: f64, black: bool) -> Result<(
     if black || smallest_change(golden, alpha) < NO_EVIDENCE {
         return Ok(());
     }
-    Err(no_evidence(
-        &golden.name,
-        "re-create it with --bless and a higher --max-spp",
-    ))
+    Err(no_evidence(&golden.name))
 }
 
 /// The settings in a golden's header, with which it can be rendered again.
@@ -166,11 +194,10 @@ pub(super) struct Facts {
 impl Facts {
     pub fn read(golden: &Side) -> Result<Self, String> {
         let (name, find) = (&golden.name, |key| golden.origin(key));
-        let lacks =
-            |key: &str| format!("{name}: its header has no {key}; re-create it with --bless");
+        let lacks = |key: &str| format!("{name}: its header has no {key}");
         let noise = golden.noise.as_ref().ok_or_else(|| {
             format!(
-                "{name}: it has no error layers, no sample counts, or fewer than two replicates; re-create it with --bless"
+                "{name}: it has no error layers, no sample counts, or fewer than two replicates"
             )
         })?;
         let samples = noise.samples[0];
@@ -194,12 +221,14 @@ impl Facts {
             .find(|i| integrator_name(*i) == integrator)
             .filter(|_| light_name(light) == kept)
             .ok_or_else(|| format!("{name}: unknown light or integrator in its header"))?;
+        let strata: u32 = number(golden, "strata").ok_or_else(|| lacks("strata"))?;
+        check_strata(name, strata, samples, noise.replicates)?;
         Ok(Self {
             scene_hash: named("scene_hash")?.into(),
             samples,
             size: golden.size,
             seed: number(golden, "seed").ok_or_else(|| lacks("seed"))?,
-            strata: number(golden, "strata").ok_or_else(|| lacks("strata"))?,
+            strata,
             max_depth: number(golden, "max_depth").ok_or_else(|| lacks("max_depth"))?,
             shadow_rays: number(golden, "shadow_rays").ok_or_else(|| lacks("shadow_rays"))?,
             light,
@@ -208,14 +237,14 @@ impl Facts {
     }
 
     /// Refuses a picture of paths of another length than the scene's: its light differs. Size, strata and seed do not change the light,
-    /// and are the picture's. `what` names it, and `remedy` is what to do.
-    pub fn check_settings(&self, scene: &Scene, what: &str, remedy: &str) -> Result<(), String> {
+    /// and are the picture's. `what` names it.
+    pub fn check_settings(&self, scene: &Scene, what: &str) -> Result<(), String> {
         let now = Settings::resolve(scene, &Overrides::default()).max_depth;
         if now == self.max_depth {
             return Ok(());
         }
         Err(format!(
-            "{what} has max_depth {}, but the scene has {now}; {remedy}",
+            "{what} has max_depth {}, but the scene has {now}",
             self.max_depth
         ))
     }
@@ -226,7 +255,7 @@ impl Facts {
             size: Some(self.size),
             max_depth: Some(self.max_depth),
             strata: Some(self.strata),
-            seed: Some(self.seed.wrapping_add(1)),
+            seed: Some(other_than(self.seed)),
             shadow_rays: Some(self.shadow_rays),
             light: Some(self.light),
             integrator: Some(self.integrator),
@@ -234,6 +263,33 @@ impl Facts {
         };
         Settings::resolve(scene, &overrides)
     }
+}
+
+/// The seed of pictures that are compared with a golden of this seed.
+fn other_than(seed: u32) -> u32 {
+    seed.wrapping_add(1)
+}
+
+/// The same for a golden that may not say its own.
+pub(super) fn other_seed(golden: &Side) -> Option<u32> {
+    number(golden, "seed").map(other_than)
+}
+
+/// Refuses strata that don't fit the samples: a golden has whole rounds of strata², which take turns among its replicates.
+fn check_strata(name: &str, strata: u32, samples: u64, replicates: u32) -> Result<(), String> {
+    let round = u64::from(strata) * u64::from(strata);
+    let whole = round > 0 && samples.is_multiple_of(round);
+    let wrong = if !whole {
+        format!("{samples} samples per pixel are no whole rounds of {strata} x {strata} strata")
+    } else if samples / round < REPLICATES as u64 && samples / round != u64::from(replicates) {
+        let rounds = samples / round;
+        format!(
+            "{samples} samples per pixel are {rounds} rounds of {strata} x {strata} strata, but it has {replicates} replicates"
+        )
+    } else {
+        return Ok(());
+    };
+    Err(format!("{name}: damaged header: {wrong}"))
 }
 
 fn number<T: FromStr>(golden: &Side, key: &str) -> Option<T> {

@@ -7,8 +7,10 @@
 
 mod assertion;
 mod candidate;
+mod changes;
 mod golden;
 mod layers;
+mod outcome;
 #[doc(hidden)]
 pub mod report;
 mod summary;
@@ -18,6 +20,8 @@ pub use assertion::{BLESS, assert_golden};
 pub use candidate::{Candidate, left_films};
 #[doc(hidden)]
 pub use golden::{Bless, Wanted};
+#[doc(hidden)]
+pub use outcome::{Outcome, Trouble};
 
 use crate::compare::{Comparison, Limits, Side, compare, html};
 use crate::engine::Engine;
@@ -40,30 +44,8 @@ use std::sync::atomic::AtomicBool;
 pub type MakeEngine<'a> =
     dyn Fn(&World, &Settings) -> Result<(Box<dyn Engine>, u64), Trouble> + Sync + 'a;
 
-/// Why a case could not be compared.
-#[doc(hidden)]
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Trouble {
-    /// The scene or the golden can't be used; why.
-    Input(String),
-    /// There is no engine, or it failed; why.
-    Device(String),
-}
-
-impl From<String> for Trouble {
-    fn from(why: String) -> Self {
-        Self::Input(why)
-    }
-}
-
-impl From<Trouble> for Outcome {
-    fn from(trouble: Trouble) -> Self {
-        match trouble {
-            Trouble::Input(why) => Outcome::Unusable(why),
-            Trouble::Device(why) => Outcome::NoDevice(why),
-        }
-    }
-}
+/// Why a golden is not kept that is not as asked for.
+const OTHER_SAMPLES: &str = "it has another size, or other samples than asked for";
 
 /// What pages call the two pictures.
 #[doc(hidden)]
@@ -92,75 +74,6 @@ pub struct Case {
     pub golden: bool,
 }
 
-/// The result of a case.
-#[doc(hidden)]
-#[derive(Debug, Clone, PartialEq)]
-pub enum Outcome {
-    /// The same up to its noise.
-    Passed(Box<Comparison>),
-    /// Different.
-    Failed {
-        /// What differs.
-        comparison: Box<Comparison>,
-        /// Why the evidence, a film and a page, could not be saved.
-        unsaved: Option<String>,
-    },
-    /// A scene without a golden.
-    New,
-    /// A golden without a scene.
-    Orphaned,
-    /// The scene or the golden can't be used; why.
-    Unusable(String),
-    /// Nothing could be rendered; why.
-    NoDevice(String),
-    /// A golden was written.
-    Blessed(Bless),
-    /// A golden was left as it is, because the scene still passes.
-    Kept(Box<Comparison>),
-}
-
-impl Outcome {
-    /// Its word in lists.
-    pub fn word(&self) -> &'static str {
-        match self {
-            Outcome::Passed(_) => "passed",
-            Outcome::Failed { .. } => "FAILED",
-            Outcome::New => "new",
-            Outcome::Orphaned => "orphaned",
-            Outcome::Unusable(_) => "unusable",
-            Outcome::NoDevice(_) => "no device",
-            Outcome::Blessed(_) => "blessed",
-            Outcome::Kept(_) => "kept",
-        }
-    }
-
-    /// Whether all is well.
-    pub fn good(&self) -> bool {
-        matches!(
-            self,
-            Outcome::Passed(_) | Outcome::Blessed(_) | Outcome::Kept(_)
-        )
-    }
-
-    /// The result in one line.
-    pub fn detail(&self, case: &Case) -> String {
-        match self {
-            Outcome::Passed(c) | Outcome::Failed { comparison: c, .. } => c.sentence(),
-            Outcome::New => format!(
-                "{} does not exist; create it with --bless",
-                case.golden_path().display()
-            ),
-            Outcome::Orphaned => format!(
-                "{} does not exist; remove the golden if this is intended",
-                case.scene_path().display()
-            ),
-            Outcome::Unusable(why) | Outcome::NoDevice(why) => why.clone(),
-            Outcome::Blessed(b) => b.to_string(),
-            Outcome::Kept(c) => format!("the golden still passes: {}", c.sentence()),
-        }
-    }
-}
-
 impl Case {
     /// The scene file.
     pub fn scene_path(&self) -> PathBuf {
@@ -182,15 +95,13 @@ impl Case {
         self.beside("report.html")
     }
 
-    /// The flags that re-create its golden, for a shell.
-    pub fn hint(&self) -> String {
-        let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
-        let name = &self.name;
-        if name.chars().all(plain) {
-            format!("--bless --scene {name}")
-        } else {
-            format!("--bless --scene '{}'", name.replace('\'', "'\\''"))
-        }
+    /// The command that re-creates its golden, for a shell.
+    pub fn bless_command(&self) -> String {
+        format!(
+            "etendue regress {} --bless --scene {}",
+            quoted(&self.dir.display().to_string()),
+            quoted(&self.name)
+        )
     }
 
     fn beside(&self, ending: &str) -> PathBuf {
@@ -212,7 +123,7 @@ impl Case {
             (_, false) => {
                 let outcome = match parse::read(&self.scene_path()) {
                     Ok(_) => Outcome::New,
-                    Err(e) => Outcome::Unusable(text(e)),
+                    Err(e) => Trouble::from(e).into(),
                 };
                 return Some((outcome, None));
             }
@@ -220,7 +131,7 @@ impl Case {
         }
         let judged = match self.judge(engine, limits, layers, stop) {
             Ok(judged) => judged?,
-            Err(trouble) => return Some((trouble.into(), None)),
+            Err(trouble) => return Some((trouble.advised(self).into(), None)),
         };
         let outcome = if judged.comparison.same() {
             self.clear();
@@ -242,16 +153,15 @@ impl Case {
         limits: &Limits,
         stop: &AtomicBool,
     ) -> Option<(Outcome, Option<[Side; 2]>)> {
-        let replaced = match self.golden.then(|| Side::read(&self.golden_path())) {
-            None => None,
-            Some(Err(e)) => Some(text(e)),
-            Some(Ok(golden)) if !wanted.met_by(&golden) => {
-                Some("it has another size, or other samples than asked for".into())
-            }
-            Some(Ok(_)) if !wanted.has_layers(&self.golden_path()) => {
+        let replaced = match self.old() {
+            Err(trouble) => return Some((trouble.into(), None)),
+            Ok(None) => None,
+            Ok(Some(Err(why))) => Some(why),
+            Ok(Some(Ok(golden))) if !wanted.met_by(&golden) => Some(OTHER_SAMPLES.into()),
+            Ok(Some(Ok(_))) if !wanted.has_layers(&self.golden_path()) => {
                 Some("it lacks layers that were asked for".into())
             }
-            Some(Ok(_)) => match self.judge(engine, limits, &wanted.layers, stop) {
+            Ok(Some(Ok(_))) => match self.judge(engine, limits, &wanted.layers, stop) {
                 Ok(None) => return None,
                 Ok(Some(judged)) if judged.comparison.same() => {
                     self.clear();
@@ -259,11 +169,11 @@ impl Case {
                     return Some((outcome, Some(judged.pictures)));
                 }
                 Ok(Some(judged)) => Some(judged.comparison.sentence()),
-                Err(Trouble::Input(why)) => Some(why),
+                Err(Trouble::Golden(why) | Trouble::Changed(why)) => Some(why),
                 Err(trouble) => return Some((trouble.into(), None)),
             },
         };
-        let made = match Candidate::render(self, engine, wanted, stop) {
+        let made = match Candidate::render(self, engine, wanted, None, stop) {
             Ok(made) => made?.put(self, wanted),
             Err(trouble) => Err(trouble),
         };
@@ -277,11 +187,41 @@ impl Case {
         Some((outcome, None))
     }
 
-    /// Makes the film that a failed run left the golden, without rendering.
-    pub fn accept(&self, film: &Path, wanted: &Wanted) -> Outcome {
-        let made = Candidate::left(self, film, wanted);
-        made.and_then(|candidate| candidate.put(self, wanted))
-            .map_or_else(Outcome::from, Outcome::Blessed)
+    /// Makes the film that a failed run left the golden, without rendering. Leaves alone a golden that passes beside it.
+    pub fn accept(&self, film: &Path, wanted: &Wanted, limits: &Limits) -> Outcome {
+        let accept = || {
+            let candidate = Candidate::left(self, film, wanted)?;
+            let replaced = match self.old()? {
+                None => None,
+                Some(Err(why)) => Some(why),
+                Some(Ok(golden)) => match candidate.against(self, &golden, wanted, limits) {
+                    Ok(comparison) if comparison.same() => {
+                        return Ok(Outcome::Kept(Box::new(comparison)));
+                    }
+                    Ok(comparison) => Some(comparison.sentence()),
+                    Err(why) => Some(why),
+                },
+            };
+            let blessed = candidate.put(self, wanted)?;
+            Ok(Outcome::Blessed(Bless {
+                replaced,
+                ..blessed
+            }))
+        };
+        accept().unwrap_or_else(|trouble: Trouble| trouble.into())
+    }
+
+    /// The golden, or why its content can't be used; `None` without one. Whatever hides a golden that may be good is an error.
+    fn old(&self) -> Result<Option<Result<Side, String>>, Trouble> {
+        if !self.golden {
+            return Ok(None);
+        }
+        golden::check_fetched(&self.golden_path())?;
+        match Side::read(&self.golden_path()) {
+            Ok(golden) => Ok(Some(Ok(golden))),
+            Err(e) if e.is_content() => Ok(Some(Err(text(e)))),
+            Err(e) => Err(e.into()),
+        }
     }
 
     fn judge(
@@ -291,14 +231,12 @@ impl Case {
         layers: &[Layer],
         stop: &AtomicBool,
     ) -> Result<Option<Judged>, Trouble> {
-        let golden = Side::read(&self.golden_path()).map_err(text)?;
-        let facts = golden::Facts::read(&golden)?;
-        let source = parse::read_text(&self.scene_path()).map_err(text)?;
-        let scene = parse::parse_str(&self.scene_path(), &source)
-            .map_err(|e| parse::ReadError::Invalid(e).to_string())?;
-        let hint = self.hint();
-        let remedy = format!("if the change is intended, re-create the golden with {hint}");
-        facts.check_settings(&scene, "the golden", &remedy)?;
+        let golden = Side::read(&self.golden_path())?;
+        let facts = golden::Facts::read(&golden).map_err(Trouble::Golden)?;
+        let (source, scene) = candidate::read(self)?;
+        facts
+            .check_settings(&scene, "the golden")
+            .map_err(Trouble::Changed)?;
         let settings = facts.settings(&scene);
         let mut provenance = Provenance::new(&scene, source, &settings);
         let layers = layers::differing(&self.golden_path(), &scene, &settings, layers);
@@ -308,17 +246,16 @@ impl Case {
                 Ok(changes) => format!("; {}", changes.join("; ")),
                 Err(why) => format!("; {why}"),
             };
-            return Err(format!(
-                "{} is of another scene than {} (hash {} and {}){seen}; {remedy}",
+            return Err(Trouble::Changed(format!(
+                "{} is of another scene than {} (hash {} and {}){seen}",
                 self.golden_path().display(),
                 self.scene_path().display(),
                 short(&facts.scene_hash),
                 short(&provenance.scene_hash)
-            )
-            .into());
+            )));
         }
-        let layers = layers?;
-        golden::check_evidence(&golden, limits.alpha, provenance.black)?;
+        let layers = layers.map_err(Trouble::Golden)?;
+        golden::check_evidence(&golden, limits.alpha, provenance.black).map_err(Trouble::Golden)?;
         let world = World::new(&scene, settings.size);
         let (mut engine, tile) = engine(&world, &settings)?;
         let rect = Rect::whole(settings.size);
@@ -359,6 +296,16 @@ impl Case {
         for path in [self.actual_path(), self.report_path()] {
             let _ = std::fs::remove_file(path);
         }
+    }
+}
+
+/// A word of a command, for a shell.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "._-/".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.into()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
     }
 }
 

@@ -2,10 +2,11 @@
 
 use super::{Case, Outcome};
 use crate::compare::{Side, html};
+use crate::date::{iso, utc};
 use crate::engine::DeviceInfo;
 use std::fmt::Write as _;
 use std::path::Path;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, SystemTime};
 
 const TEMPLATE: &str = include_str!("index.html");
 
@@ -62,6 +63,7 @@ pub fn summary(done: &[Done], filter: Option<&Filter>) -> String {
         "orphaned",
         "unusable",
         "no device",
+        "no access",
         "blessed",
         "kept",
     ];
@@ -93,7 +95,7 @@ pub fn junit(done: &[Done], about: &About) -> String {
     let _ = writeln!(
         xml,
         "<testsuite name=\"etendue regress\" {counts} timestamp=\"{}\">",
-        utc(about.time).replace(' ', "T").replace("TUTC", ":00Z")
+        iso(about.time)
     );
     let adapter = format!("{}, {}", about.device.name, about.device.driver);
     let _ = writeln!(xml, "<properties>");
@@ -149,8 +151,8 @@ pub fn advice(case: &Case, unsaved: Option<&str>) -> String {
         ),
         Some(why) => format!("its film and page could not be saved: {why}"),
     };
-    let flags = case.hint();
-    format!("{evidence}; if the change is intended, re-create the golden with {flags}")
+    let command = case.bless_command();
+    format!("{evidence}; if the change is intended, re-create the golden: {command}")
 }
 
 /// The name of a folder, whatever path leads to it.
@@ -161,7 +163,10 @@ fn folder(dir: &Path) -> String {
 }
 
 fn unusable(done: &Done) -> bool {
-    matches!(done.outcome, Outcome::Unusable(_) | Outcome::NoDevice(_))
+    matches!(
+        done.outcome,
+        Outcome::Unusable(_) | Outcome::NoDevice(_) | Outcome::NoAccess(_)
+    )
 }
 
 /// Text for XML, which knows no control characters but tab and line break.
@@ -223,54 +228,4 @@ pub(super) fn made(about: &About) -> String {
 /// The results as Markdown.
 pub fn markdown(done: &[Done], filter: Option<&Filter>, about: &About) -> String {
     super::summary::markdown(done, filter, about)
-}
-
-/// A time to the minute: "2026-02-28 23:59 UTC".
-fn utc(time: SystemTime) -> String {
-    let seconds = time
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default()
-        .as_secs();
-    let (days, minutes) = (seconds / 86_400, seconds % 86_400 / 60);
-    // The Gregorian calendar repeats every 400 years of 146097 days. Its years here start in March, so that a leap day is a year's
-    // last, and the first day is 1 March of the year 0.
-    let days = days + 719_468;
-    let (era, day) = (days / 146_097, days % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    // March to July have 153 days, and so have the next five months.
-    let month = (5 * day + 2) / 153;
-    let day = day - (153 * month + 2) / 5 + 1;
-    let (year, month) = if month < 10 {
-        (year, month + 3)
-    } else {
-        (year + 1, month - 9)
-    };
-    let year = 400 * era + year;
-    format!(
-        "{year}-{month:02}-{day:02} {:02}:{:02} UTC",
-        minutes / 60,
-        minutes % 60
-    )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Dates from `date -u -d @SECONDS`.
-    #[test]
-    fn times_are_in_the_gregorian_calendar() {
-        for (seconds, text) in [
-            (0, "1970-01-01 00:00 UTC"),
-            (951_782_399, "2000-02-28 23:59 UTC"),
-            (951_782_400, "2000-02-29 00:00 UTC"),
-            (951_868_800, "2000-03-01 00:00 UTC"),
-            (1_735_689_599, "2024-12-31 23:59 UTC"),
-            (1_772_323_199, "2026-02-28 23:59 UTC"),
-            (4_107_542_400, "2100-03-01 00:00 UTC"),
-        ] {
-            assert_eq!(utc(UNIX_EPOCH + Duration::from_secs(seconds)), text);
-        }
-    }
 }

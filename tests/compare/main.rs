@@ -127,6 +127,23 @@ fn noise_is_equal_and_a_patch_is_different() {
         .stdout(contains("bit-identical").and(contains("both were rendered with seed")));
 }
 
+/// One render twice is no second measurement.
+#[test]
+fn a_film_and_its_own_picture_are_no_evidence() {
+    let p = Pictures::new();
+    let film = whole(1, |x, _| 0.1 + f64::from(x));
+    let (a, b) = (p.put("a.exr", &film), p.put("a.npz", &film));
+    let no_evidence = "the same samples, equal but for the rounding of files: no evidence";
+    run(&a, &b, &[]).code(0).stdout(contains(no_evidence));
+    // Another render of the same seed is another picture.
+    let c = p.put("c.npz", &whole(2, |x, _| 0.1 + f64::from(x)));
+    run(&a, &c, &[]).code(0).stdout(
+        contains("equal up to noise")
+            .and(contains("both were rendered with seed"))
+            .and(contains(no_evidence).not()),
+    );
+}
+
 #[test]
 fn a_film_and_its_picture_say_the_same() {
     let p = Pictures::new();

@@ -40,6 +40,24 @@ fn renders_of_any_program_state_their_noise_by_their_spread() {
     compare(&[brighter], &b, &[])
         .code(1)
         .stdout(contains("pixels at (16, 8)"));
+    let mut with_one = etendue();
+    with_one.arg("compare").arg(&ours).arg("--b").args(&b);
+    with_one
+        .assert()
+        .code(0)
+        .stdout(contains("equal up to noise"));
+    // A PNG picture ends at white.
+    let bright = |k: u32| p.put(&format!("w{k}.png"), &whole(40 + u64::from(k), |_, _| 2.0));
+    let whites: Vec<PathBuf> = (0..4).map(bright).collect();
+    let linear = side("l", 50, &|_, _| 2.0);
+    compare(&linear, &whites, &[]).code(1).stdout(
+        contains("w0.png and 3 more ends at white, as 8-bit pictures do: ")
+            .and(contains("of 1280 pixels are white in it and brighter in ")),
+    );
+    let dim = side("d", 60, &|_, _| 0.1);
+    compare(&dim, &whites, &[])
+        .code(1)
+        .stdout(contains("ends at white").not());
     // The mean and its error, of one pixel by hand.
     let read = |path: &PathBuf| f64::from(read_exr(path).expect("a picture").rgb[5][0]);
     let values: Vec<f64> = a.iter().map(read).collect();

@@ -258,6 +258,17 @@ fn a_full_disk_is_an_error_and_the_film_stays() {
     );
     assert_eq!(fs::read(bench.path("after")).expect("the film"), before);
     assert!(bench.path("b.png").exists(), "what can be saved is");
+    // The film is saved where there is room.
+    let names = bench.names();
+    let rescued = names.iter().find(|n| n.starts_with("f.rescued-"));
+    let rescued = rescued.unwrap_or_else(|| panic!("no film in {names:?}: {said}"));
+    assert!(
+        said.contains(&format!(
+            "warning: disk/f.npz: the film can't be saved there; it is in {rescued}, with all samples"
+        )),
+        "{said}"
+    );
+    assert_eq!(bench.film(rescued).coverage.samples(), (20, 20));
 
     // Full for some checkpoints only: they are warned of, and nothing is lost.
     let script = format!(
@@ -268,6 +279,12 @@ fn a_full_disk_is_an_error_and_the_film_stays() {
     let said = bench.said();
     assert!(
         said.contains("warning: disk/f.npz: cannot write: no space left"),
+        "{said}"
+    );
+    let warnings = said.lines().filter(|l| l.contains("cannot write"));
+    let warnings: Vec<&str> = warnings.collect();
+    assert!(
+        warnings.len() == 1 && warnings[0].ends_with(" UTC); it is tried again until the end"),
         "{said}"
     );
     let samples = bench.film("after").coverage.samples().0;

@@ -58,6 +58,45 @@ fn the_pair_that_overlaps_is_named_unless_one_is_damaged() {
     assert!(!bench.path("out.npz").exists());
 }
 
+/// A slice that is resumed stays one, and fits the others.
+#[test]
+fn a_slice_is_resumed_within_its_range() {
+    let bench = Bench::new();
+    bench.render("--samples 0..8 --film a.npz -o a.png");
+    bench
+        .run("render box.toml --backend cpu --film a.npz -o a.png --time 1s")
+        .success()
+        .stderr(says("samples 0..8").and(says("nothing rendered")));
+    assert_eq!(bench.film("a.npz").coverage.samples(), (8, 8));
+    // Who asks for others gets them, and is told.
+    for flag in ["--spp 12", "--rays 3"] {
+        fs::copy(bench.path("a.npz"), bench.path("d.npz")).expect("copied");
+        bench
+            .run(&format!(
+                "render box.toml --backend cpu --film d.npz -o a.png {flag}"
+            ))
+            .success()
+            .stderr(says(
+                "warning: this film is a slice, samples 0..8; --spp and --rays ask for others",
+            ));
+        assert_eq!(bench.film("d.npz").coverage.samples(), (12, 12));
+    }
+    // One that was interrupted goes on to its end, and a larger range can be asked for.
+    bench.render("--samples 0..16 --film a.npz -o a.png");
+    bench.render("--samples 16..24 --film b.npz -o a.png");
+    bench.run("merge sum.npz a.npz b.npz").success();
+    assert_eq!(bench.film("sum.npz").coverage.samples(), (24, 24));
+    // The sum is none.
+    bench.render("--spp 32 --film sum.npz -o a.png");
+    assert_eq!(bench.film("sum.npz").coverage.samples(), (32, 32));
+    // What was typed is named, not what surrounds it.
+    bench.render("--region 0,0,4,4 --spp 4 --film c.npz -o a.png");
+    bench
+        .run("render box.toml --backend cpu --film c.npz -o a.png --region 0,0,4,4 --region 8,8,12,12")
+        .code(2)
+        .stderr(says("but the command line selects 0,0,4,4 and 8,8,12,12;"));
+}
+
 #[test]
 fn a_foreign_scene_is_named() {
     let bench = Bench::new();

@@ -49,6 +49,7 @@ pub fn provenance(size: [u32; 2]) -> Provenance {
             integrator: Integrator::Path,
             light_paths: true,
         },
+        slice: None,
         samples: 0.0,
         replicates: 0,
         devices: Vec::new(),

@@ -5,7 +5,9 @@ import http.server
 import os
 import pathlib
 import subprocess
+import tarfile
 import threading
+import tomllib
 
 import pytest
 
@@ -62,32 +64,69 @@ class Runner:
         path.chmod(0o755)
 
 
-def test_the_version_and_the_key_come_from_the_sources(runner):
-    assert runner.run("The version of this action", SOURCE=os.fspath(ROOT)).returncode == 0
-    told = runner.outputs()
+def test_the_version_and_the_keys_come_from_the_sources_and_the_scenes(runner):
+    def told():
+        (runner.folder / "output").unlink(missing_ok=True)
+        done = runner.run("The version of this action", SOURCE=os.fspath(ROOT), SCENES="scenes")
+        assert done.returncode == 0, done.stderr
+        return runner.outputs()
+
+    first = told()
     cargo = (ROOT / "Cargo.toml").read_text()
-    assert f'version = "{told["version"]}"' in cargo and told["key"].startswith(f"etendue-{told['version']}-")
-    assert runner.steps["The program and compiled kernels of an earlier run"]["with"]["key"] == "${{ steps.version.outputs.key }}"
+    assert f'version = "{first["version"]}"' in cargo and first["program"].startswith(f"etendue-{first['version']}-")
+    assert first["key"].startswith(first["program"] + "-") and told() == first
+    # Scenes that are added have kernels of their own, and goldens have none.
+    (runner.folder / "work/scenes/golden").mkdir()
+    (runner.folder / "work/scenes/golden/room.exr").write_text("")
+    assert told() == first
+    (runner.folder / "work/scenes/more.toml").write_text("")
+    assert told()["key"] != first["key"] and told()["program"] == first["program"]
+    restore = runner.steps["The program and compiled kernels of an earlier run"]
+    save = runner.steps["Keep the program and compiled kernels"]
+    assert restore["with"]["key"] == save["with"]["key"] == "${{ steps.version.outputs.key }}"
+    assert restore["with"]["restore-keys"] == "${{ steps.version.outputs.program }}-"
+    # A red run keeps what it has made.
+    assert save["if"].startswith("always() && ") and save["with"]["path"] == restore["with"]["path"]
 
 
-def test_a_release_is_downloaded_once(runner):
+@pytest.fixture
+def release(runner):
+    """A release on a server of ours: its version, and the folder that holds it."""
     archive = os.environ.get("ETENDUE_ARCHIVE")
-    if archive is None:
-        pytest.skip("scripts/package names the archive in ETENDUE_ARCHIVE")
-    archive = pathlib.Path(archive)
-    version = archive.stem.rsplit("-v", 1)[1]
+    version = tomllib.loads((ROOT / "Cargo.toml").read_text())["package"]["version"]
     there = runner.folder / f"www/some/one/releases/download/v{version}"
     there.mkdir(parents=True)
-    (there / archive.name).symlink_to(archive)
+    name = f"etendue-{os.uname().machine}-unknown-linux-gnu-v{version}"
+    if archive is None:
+        with tarfile.open(there / f"{name}.tgz", "w:gz") as made:
+            made.add(etendue.program(), f"{name}/etendue")
+    else:
+        (there / f"{name}.tgz").write_bytes(pathlib.Path(archive).read_bytes())
+    workflow = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())
+    steps = {step["name"]: step for step in workflow["jobs"]["packages"]["steps"] if "name" in step}
+    script = steps["Checksums, by which the action knows the archive"]["run"].replace("target/package", os.fspath(there))
+    subprocess.run(["bash", "-ec", script], check=True)
     handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=runner.folder / "www")
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         runner.server = f"http://127.0.0.1:{server.server_port}"
-        values = {"SOURCE": os.fspath(ROOT), "REPOSITORY": "some/one", "REF": f"v{version}", "VERSION": version}
-        done = runner.run("The program", **values)
-        assert done.returncode == 0 and done.stdout == f"etendue {version}\n", done.stderr
+        yield version, there
         server.shutdown()
+
+
+def test_a_release_is_downloaded_once_and_verified(runner, release):
+    version, there = release
+    values = {"SOURCE": os.fspath(ROOT), "REPOSITORY": "some/one", "REF": f"v{version}", "VERSION": version}
+    archive = next(there.glob("*.tgz"))
+    good = archive.read_bytes()
+    archive.write_bytes(good + b"more")
+    done = runner.run("The program", **values)
+    assert done.returncode != 0 and f"{archive.name}: FAILED" in done.stdout
+    archive.write_bytes(good)
+    done = runner.run("The program", **values)
+    assert done.returncode == 0 and done.stdout.endswith(f"\netendue {version}\n"), done.stderr
     # The second time it is in the cache.
+    archive.unlink()
     assert runner.run("The program", **values).returncode == 0
 
 
@@ -112,6 +151,17 @@ def test_pictures_are_compared_and_summed_up(runner):
     assert done.returncode == 0, done.stdout + done.stderr
     assert runner.file("step_summary").startswith("### 1 of 1 scene (--scene room): 1 passed\n")
     assert "false-alarm rate 1e-5" in runner.file("step_summary")
+    # Quotes hold words together, and nothing is run.
+    for arguments, told in [
+        ("--filter \"ro om\"", 'contains "ro om"'),
+        ("--filter 'r\"m'", 'contains "r"m"'),
+        ("--filter $(touch${IFS}ran)`touch${IFS}ran`", "contains"),
+        ("--filter 'room", "quote"),
+    ]:
+        done = runner.run("Golden pictures", SCENES="scenes", ARGUMENTS=arguments)
+        assert done.returncode != 0 and told in done.stderr, done.stderr
+    assert not (runner.folder / "work/ran").exists()
+    assert runner.run("Golden pictures", SCENES="scenes", ARGUMENTS="").returncode == 0
     uploaded = runner.steps["Pages, and films of what failed"]["with"]["path"].split("\n")
     assert all((runner.folder / "work" / path).exists() for path in uploaded if path.startswith("etendue-results"))
 

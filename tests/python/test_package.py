@@ -72,10 +72,32 @@ def test_a_film_is_resumed_saved_and_merged(room, tmp_path):
     assert np.allclose(merged.mean, whole.mean, rtol=1e-6) and (merged.samples == 512).all()
     merged.save(tmp_path / "merged.npz")
     assert (etendue.Film.open(tmp_path / "merged.npz").mean == merged.mean).all()
-    with pytest.raises(etendue.InputError, match="samples"):
-        etendue.merge([halves[0], halves[0]])
+    with pytest.raises(etendue.InputError, match="^film 2 of 2: cannot be merged with film 1 of 2: .*samples"):
+        etendue.merge([halves[0], etendue.render(room, samples=(0, 8), backend="cpu")])
+    with pytest.raises(ValueError, match="at least one film"):
+        etendue.merge([])
     with pytest.raises(TypeError, match="a list of films"):
         etendue.merge(halves[0])
+
+
+def test_sizes_samples_and_regions_have_several_forms(room):
+    whole = etendue.render(room, spp=16, size=(12, 8), backend="cpu")
+    for size, samples in [("12x8", (0, 16)), ([12, 8], range(16)), (np.array([12, 8]), "0..16")]:
+        assert (etendue.render(room, size=size, samples=samples, backend="cpu").mean == whole.mean).all()
+    part = etendue.render(room, spp=16, size="12x8", regions=(2, 3, 10, 8), backend="cpu")
+    assert part.bounds == (2, 3, 10, 8)
+    for wrong, told in [
+        ({"size": "32"}, r"size is '32'; it must be a width and a height: \(640, 480\)"),
+        ({"size": (32,)}, r"size is \(32,\);"),
+        ({"samples": range(0, 64, 2)}, r"samples is range\(0, 64, 2\); it must be the first number"),
+        ({"samples": 64}, "samples is 64;"),
+        ({"regions": [(0, 0, 10)]}, r"a region is \(0, 0, 10\); it must be four whole numbers"),
+        ({"regions": "0,0"}, "a region is '0,0'; it must be four"),
+    ]:
+        with pytest.raises(ValueError, match=told):
+            etendue.render(room, **wrong)
+    with pytest.raises(etendue.InputError, match="^scene:1:7: "):
+        etendue.render("title=")
 
 
 def test_regions_have_bounds(room):
@@ -101,13 +123,24 @@ def test_compare_tells_light_from_noise(room, film, tmp_path):
     assert 0 < verdict.detects < 1 and verdict.sentence.startswith("equal up to noise")
     room["light"][0]["radiance"] = [12, 8, 8]
     brighter = etendue.render(room, spp=64, seed=1, backend="cpu")
+    png = tmp_path / "film.png"
+    film.save(png)
     verdict = etendue.compare(film, brighter, html=tmp_path / "page.html")
     assert not verdict and verdict.p < 0.001 and (tmp_path / "page.html").exists()
     first = verdict.findings[0]
     assert first.channel == "red" and first.means[1] > first.means[0]
     assert verdict.table in str(verdict) + "\n" and "different scenes" in str(verdict)
-    with pytest.raises(etendue.InputError, match="24 x 16 pixels"):
+    with pytest.raises(etendue.InputError, match="^a has 24 x 16 pixels, but b has 8 x 8"):
         etendue.compare(film, etendue.render(room, spp=16, size=(8, 8), backend="cpu"))
+    renders = [etendue.render(room, spp=16, seed=seed, backend="cpu") for seed in range(8)]
+    room["light"][0]["radiance"] = [4, 4, 4]
+    dim = [etendue.render(room, spp=16, seed=seed, backend="cpu") for seed in range(8, 12)]
+    assert not etendue.compare(renders[:4], dim) and not etendue.compare(brighter, dim)
+    assert not etendue.compare(renders[:4], renders[4:]).identical
+    with pytest.raises(ValueError, match="^a is empty"):
+        etendue.compare([], dim)
+    with pytest.raises(etendue.InputError, match=r"use max_flip= or max_relative_rmse=.*\(a=, b=\), or by variances with spp_a= or spp_b="):
+        etendue.compare(film, png)
 
 
 def test_errors_carry_the_program_s_message(room, tmp_path):
@@ -117,7 +150,7 @@ def test_errors_carry_the_program_s_message(room, tmp_path):
     assert told.value.status == 2 and isinstance(told.value, ValueError)
     with pytest.raises(etendue.FileError, match="no_such.toml"):
         etendue.render(tmp_path / "no_such.toml")
-    with pytest.raises(etendue.InputError, match="--spp"):
+    with pytest.raises(etendue.InputError, match=r"^invalid value '-1' for spp=: expected a whole number from 1 to \d+$"):
         etendue.render(room, spp=-1)
     with pytest.raises(etendue.DeviceError, match="no adapter"):
         room["sphere"][0]["material"] = "steel"

@@ -37,10 +37,11 @@ def test_a_changed_scene_fails_until_it_is_made_anew(project, room):
     project.makefile(".toml", room=dumps(room))
     done = project.runpytest_subprocess()
     done.assert_outcomes(failed=1)
-    done.stdout.fnmatch_lines(["*is of another scene than*re-create the golden with pytest --force-regen"])
+    done.stdout.fnmatch_lines(["*is of another scene than*re-create the golden: pytest --force-regen"])
     done = project.runpytest_subprocess("--force-regen")
     done.assert_outcomes(failed=1)
-    done.stdout.fnmatch_lines(["*golden/room.exr was re-created*"])
+    done.stdout.fnmatch_lines(["*golden/room.exr was re-created*", "*the golden before it: *is of another scene than*"])
+    assert "pytest --force-regen" not in done.stdout.str()
     project.runpytest_subprocess().assert_outcomes(passed=1)
 
 
@@ -64,6 +65,13 @@ def test_a_difference_is_told_with_its_place_and_page(project):
         "*see *room.report.html and *room.actual.npz*pytest --force-regen*",
     ])
     assert (project.path / "golden/room.report.html").exists()
+
+
+def test_a_golden_that_cannot_be_written_is_an_error(project):
+    (project.path / "golden/room.exr/in the way").mkdir(parents=True)
+    done = project.runpytest_subprocess("--force-regen")
+    done.assert_outcomes(failed=1)
+    done.stdout.fnmatch_lines(["E * etendue.FileError: no access  room: *room.exr: cannot *"])
 
 
 def scene_hash(exr: bytes) -> bytes:

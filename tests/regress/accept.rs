@@ -26,6 +26,18 @@ fn the_films_of_a_failed_run_become_goldens_without_rendering() {
         .stdout(contains("blessed  one: 24x18, ").and(contains("1 scene: 1 blessed")));
     assert_eq!(fs::read(f.golden("two.exr")).expect("a golden"), two);
     f.run(&[]).code(0);
+    // A golden beside which the film passes stays as it is: now this one, and before that any other.
+    let accepted = fs::read(f.golden("one.exr")).expect("a golden");
+    fs::copy(there.join("one.actual.npz"), there.join("two.actual.npz")).expect("copied");
+    f.run(&["--accept", folder]).code(0).stdout(
+        contains("kept  one: the golden still passes: ")
+            .and(contains(
+                "kept  two: the golden still passes: equal up to noise",
+            ))
+            .and(contains("2 scenes: 2 kept")),
+    );
+    assert_eq!(fs::read(f.golden("one.exr")).expect("a golden"), accepted);
+    assert_eq!(fs::read(f.golden("two.exr")).expect("a golden"), two);
     // The golden is the film, to the digits of a picture.
     let film = etendue::output::store::load(&there.join("one.actual.npz")).expect("a film");
     let golden = read_exr(&f.golden("one.exr")).expect("a golden");
@@ -137,9 +149,6 @@ fn a_review_asks_about_what_changed_and_nothing_else() {
         .code(2)
         .stdout(contains("unusable  changed").and(contains("FAILED  failed")));
     assert_eq!(goldens(), before);
-    // The page has the old picture and the new one.
-    let page = fs::read_to_string(f.golden("changed.report.html")).expect("a page");
-    assert!(page.contains("alt=\"changed, golden\"") && page.contains("alt=\"changed, now\""));
     let page = fs::read_to_string(f.golden("new.report.html")).expect("a page");
     assert!(page.contains("alt=\"new, now\"") && !page.contains("alt=\"new, golden\""));
     // An answer that is none is asked for again; the scene with errors is told, and not asked about.
@@ -191,4 +200,67 @@ fn the_summary_is_markdown_with_failures_first() {
     f.run(&["--summary", f.golden("two.exr").to_str().expect("a name")])
         .code(2)
         .stderr(contains("would overwrite"));
+}
+
+/// What a person wants to see before another golden is accepted: pictures, numbers, and the lines that were changed.
+#[test]
+fn a_review_says_what_differs_in_a_changed_scene() {
+    let f = Folder::new(&["one"]);
+    f.run(&["--bless", "--power", "5%", "--size", "20x15"])
+        .code(0);
+    f.put("one", &BALL.replace(DARKER[0], DARKER[1]));
+    let review = |flags: &[&str]| {
+        let done = f.run(&[&["--review", "--power", "5%"], flags].concat());
+        let done = done.code(2).get_output().clone();
+        String::from_utf8(done.stderr).expect("text")
+    };
+    let said = review(&[]);
+    for told in [
+        "is of another scene than",
+        "different in the whole picture",
+        "in the whole picture           red ",
+        "relative RMSE",
+        "the text of the scene differs from line 23 on:",
+        "- radiance = [20.0, 20.0, 20.0]",
+        "+ radiance = [5.0, 5.0, 5.0]",
+    ] {
+        assert!(said.contains(told), "no {told}: {said}");
+    }
+    // No noise is shared, so that it is evidence.
+    assert!(!said.contains("seed"), "{said}");
+    let page = fs::read_to_string(f.golden("one.report.html")).expect("a page");
+    for told in [
+        "alt=\"Picture golden\"",
+        "alt=\"Picture now\"",
+        "Difference over its noise",
+        "+ radiance = [5.0, 5.0, 5.0]",
+        "<th scope=\"row\">relative RMSE</th>",
+    ] {
+        assert!(page.contains(told), "no {told}");
+    }
+    assert!(!page.contains("scene_text"));
+    // Pictures of other sizes can't be compared, but texts can.
+    let said = review(&["--size", "12x9"]);
+    assert!(
+        said.contains("has 20 x 15 pixels, but") && said.contains("+ radiance = [5.0, 5.0, 5.0]"),
+        "{said}"
+    );
+    let page = fs::read_to_string(f.golden("one.report.html")).expect("a page");
+    assert!(page.contains("alt=\"one, golden\"") && page.contains("alt=\"one, now\""));
+}
+
+/// Goldens whose stated error is in doubt are made, and say so.
+#[test]
+fn a_golden_in_doubt_says_so() {
+    let f = Folder::new(&["one"]);
+    let summary = f.path("summary.md");
+    let flags = ["--summary", summary.to_str().expect("a name")];
+    f.run(&[&["--bless", "--max-spp", "8"][..], &flags].concat())
+        .code(0)
+        .stdout(contains("its stated error is in doubt: it rests on too few samples"))
+        .stderr(contains(
+            "warning: one: the stated error of this golden is in doubt: it rests on too few samples",
+        ));
+    let text = fs::read_to_string(summary).expect("a summary");
+    assert!(text.contains("its stated error is in doubt"), "{text}");
 }

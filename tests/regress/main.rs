@@ -121,7 +121,8 @@ fn render(text: &str, seed: u32, samples: u64) -> (Film, Provenance) {
 fn goldens_are_made_and_pass_with_another_seed() {
     let f = Folder::new(&["one", "two"]);
     f.run(&[]).code(1).stdout(
-        contains("one.exr does not exist; create it with --bless").and(contains("2 scenes: 2 new")),
+        contains("one.exr does not exist; create it: etendue regress ")
+            .and(contains("2 scenes: 2 new")),
     );
     f.bless();
     let (junit, html) = (f.path("r.xml"), f.path("r.html"));
@@ -315,10 +316,15 @@ fn another_max_depth_is_another_picture() {
     f.run(&[])
         .code(2)
         .stdout(contains("the golden has max_depth 64, but the scene has 3"))
-        .stdout(contains("re-create the golden with --bless --scene one"));
-    f.run(&["--bless"]).code(0).stdout(contains(
-        "the golden before it: the golden has max_depth 64, but the scene has 3",
-    ));
+        .stdout(contains(format!(
+            "re-create the golden: etendue regress {} --bless --scene one\n",
+            f.0.path().display()
+        )));
+    // Who has just re-created it needs no advice to do so.
+    f.run(&["--bless"]).code(0).stdout(
+        contains("the golden before it: the golden has max_depth 64, but the scene has 3\n")
+            .and(contains("re-create").not()),
+    );
     f.run(&["-q"]).code(0).stdout("");
 }
 

@@ -65,7 +65,7 @@ fn invalid_scenes_are_named_even_without_a_golden() {
         .code(2)
         .stdout(contains("unusable  bad: ").and(contains("bad.toml:1:")))
         .stdout(
-            contains("good.exr does not exist; create it with --bless")
+            contains("good.exr does not exist; create it: etendue regress ")
                 .and(contains("2 scenes: 1 new, 1 unusable")),
         );
     // Each stands in one list alone, and a quiet run says nothing else.
@@ -107,6 +107,14 @@ fn goldens_that_git_has_not_fetched_or_has_changed_are_named() {
         .stdout(contains("unusable  one: ").and(contains(
             "not an EXR picture (a git-lfs pointer; `git lfs pull`",
         )));
+    // Whether it still passes is not known, so it is not replaced.
+    f.run(&["--bless"])
+        .code(2)
+        .stdout(contains("unusable  one: ").and(contains("run `git lfs pull` first")));
+    f.run(&["--review"])
+        .code(2)
+        .stderr(contains("accept it as the golden").not());
+    assert_eq!(std::fs::read(&golden).expect("there"), pointer.as_bytes());
     let mut changed = Vec::new();
     for byte in good {
         changed.extend((byte == b'\n').then_some(b'\r'));
@@ -190,4 +198,73 @@ fn without_an_adapter_there_is_no_verdict() {
     regress(&[])
         .code(0)
         .stderr(contains("rendering on the CPU reference"));
+}
+
+/// Headers that have been damaged, or written by hand.
+#[test]
+fn a_header_that_does_not_fit_the_pixels_is_damage() {
+    let f = Folder::new(&["one"]);
+    f.run(&["--bless", "--max-spp", "64"]).code(0);
+    let path = f.golden("one.exr");
+    let good = std::fs::read(&path).expect("a golden");
+    for (name, value, told) in [
+        (
+            "samples",
+            80i32,
+            "its header says samples = 80, but its pixels have 64 on average",
+        ),
+        (
+            "strata",
+            3,
+            "64 samples per pixel are no whole rounds of 3 x 3 strata",
+        ),
+        (
+            "strata",
+            8,
+            "64 samples per pixel are 1 rounds of 8 x 8 strata, but it has 4 replicates",
+        ),
+        (
+            "strata",
+            0,
+            "64 samples per pixel are no whole rounds of 0 x 0 strata",
+        ),
+    ] {
+        let mark = format!("{name}\0int\0\x04\0\0\0");
+        let at = good.windows(mark.len()).position(|w| w == mark.as_bytes());
+        let at = at.expect("the attribute") + mark.len();
+        let mut bytes = good.clone();
+        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        std::fs::write(&path, bytes).expect("written");
+        f.run(&[])
+            .code(2)
+            .stdout(contains("unusable  one: ").and(contains(told)));
+    }
+}
+
+/// The exit status tells a full disk from a scene that can't be compared.
+#[cfg(unix)]
+#[test]
+fn a_golden_that_cannot_be_written_is_no_fault_of_the_scene() {
+    let f = Folder::new(&["one"]);
+    // Something is in the way, for those whom rights do not bind too.
+    std::fs::create_dir_all(f.golden("one.exr").join("in the way")).expect("made");
+    let junit = f.path("r.xml");
+    f.run(&[
+        "--bless",
+        "--max-spp",
+        "16",
+        "--junit",
+        junit.to_str().expect("a name"),
+    ])
+    .code(4)
+    .stdout(
+        contains("no access  one: ")
+            .and(contains("one.exr: cannot write: "))
+            .and(contains("1 scene: 1 no access")),
+    );
+    let xml = std::fs::read_to_string(junit).expect("written");
+    assert!(
+        xml.contains("errors=\"1\"") && xml.contains("<error type=\"no access\""),
+        "{xml}"
+    );
 }

@@ -21,22 +21,24 @@ Examples:
   etendue compare before.png after.png --max-flip 0.05
   etendue compare --a old1.exr old2.exr old3.exr old4.exr --b new1.exr new2.exr new3.exr new4.exr
       four renders of each side, with four seeds, by any program
+  etendue compare ours.npz --b new1.exr new2.exr new3.exr new4.exr
+      a picture that states its noise, and four renders that do not
   etendue compare ours.npz moments.exr --spp-b 256
       a picture of Mitsuba's integrator `moment`, of 256 samples a pixel
 
 Exit status: 0 equal, 1 different, 2 not comparable, 4 a file can't be read or written.")]
 pub struct CompareArgs {
     /// Reference picture: .exr, .png, .npz (a film); or .hdr, .jpg, .tif, .webp
-    #[arg(required_unless_present = "renders_a", conflicts_with_all = ["renders_a", "renders_b"])]
+    #[arg(required_unless_present = "renders_a", conflicts_with = "renders_a")]
     pub a: Option<PathBuf>,
     /// Picture to compare with it
-    #[arg(required_unless_present = "renders_a")]
+    #[arg(required_unless_present_any = ["renders_a", "renders_b"], conflicts_with_all = ["renders_a", "renders_b"])]
     pub b: Option<PathBuf>,
     /// Independent renders of the reference, by any program: their spread is its noise
     #[arg(long = "a", id = "renders_a", value_name = "FILE", num_args = 1.., requires = "renders_b")]
     pub renders_a: Vec<PathBuf>,
     /// Independent renders to compare with it
-    #[arg(long = "b", id = "renders_b", value_name = "FILE", num_args = 1.., requires = "renders_a")]
+    #[arg(long = "b", id = "renders_b", value_name = "FILE", num_args = 1..)]
     pub renders_b: Vec<PathBuf>,
     /// Samples per pixel of the reference, if it states variances without saying so
     #[arg(long, value_name = "N", value_parser = values::samples, allow_hyphen_values = true)]
@@ -91,7 +93,7 @@ Examples:
 
 Exit status: 0 all passed; 1 one failed, or a scene or its golden is missing; 2 one can't be compared (the scene has errors, \
 or its golden is damaged or of another scene), or there is nothing to compare; 3 no usable adapter, or the device failed; 4 the \
-folder can't be read, or the results can't be written; 130, 143 or 129 interrupted, after telling the results so far.")]
+folder, a scene or a golden can't be read, or a golden or the results can't be written; 130, 143 or 129 interrupted, after telling the results so far.")]
 pub struct RegressArgs {
     /// Folder with the scenes
     pub dir: PathBuf,
