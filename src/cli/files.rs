@@ -1,7 +1,7 @@
 //! The files that a command reads and writes. No output may overwrite an input or another output.
 
 use super::failure::Failure;
-use crate::files::{FileError, atomic, resolve};
+use crate::files::{atomic, resolve};
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -54,20 +54,9 @@ impl Files {
     /// Adds a film that is resumed, or created if it does not exist.
     pub fn writes_film(&mut self, what: &str, path: &Path) -> Result<(), Failure> {
         self.writes(what, path)?;
-        match fs::metadata(path) {
-            // Saving renames a new file over the film. The film's own permissions would not prevent that.
-            Ok(meta) if meta.is_file() => {
-                let protected = meta.permissions().readonly();
-                let refused = fs::OpenOptions::new().write(true).open(path);
-                if protected || refused.is_err() {
-                    let message = "cannot write the film: it is read-only".into();
-                    let path = path.into();
-                    return Err(FileError::Io { path, message }.into());
-                }
-                Ok(())
-            }
-            Ok(_) => Ok(()),
-            Err(_) => check_film_name(what, path),
+        match path.exists() {
+            true => Ok(()),
+            false => check_film_name(what, path),
         }
     }
 

@@ -28,7 +28,10 @@ where
 /// Checks that `path` can be replaced. Call it before hours of rendering.
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     let attempt = || match target(path)? {
-        Target::File(file) => temporary(&file).map(drop),
+        Target::File(file) => {
+            check_not_protected(&file)?;
+            temporary(&file).map(drop)
+        }
         Target::Special => fs::OpenOptions::new().write(true).open(path).map(drop),
     };
     attempt().map_err(|e| FileError::io(path, "cannot write", &e))
@@ -38,6 +41,17 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
 pub fn check_folder(path: &Path) -> Result<(), FileError> {
     let found = target(path).map(drop);
     found.map_err(|e| FileError::io(path, "cannot read", &e))
+}
+
+/// Refuses a file that its owner has made read-only: renaming a new file over it would not ask.
+fn check_not_protected(path: &Path) -> io::Result<()> {
+    let Ok(meta) = fs::metadata(path) else {
+        return Ok(());
+    };
+    if meta.permissions().readonly() || fs::OpenOptions::new().write(true).open(path).is_err() {
+        return Err(io::Error::other("it is read-only"));
+    }
+    Ok(())
 }
 
 enum Target {

@@ -192,7 +192,7 @@ fn films_of_other_names() {
 
 #[cfg(unix)]
 #[test]
-fn a_read_only_film_is_not_resumed() {
+fn read_only_files_are_not_replaced() {
     use std::os::unix::fs::PermissionsExt;
     let bench = Bench::new();
     bench.render("--spp 1 --film f.npz -o a.png");
@@ -201,9 +201,21 @@ fn a_read_only_film_is_not_resumed() {
     bench
         .run("render box.toml --backend cpu --spp 4 --film f.npz -o a.png")
         .code(4)
-        .stderr("error: f.npz: cannot write the film: it is read-only\n");
+        .stderr("error: f.npz: cannot write: it is read-only\n");
     assert!(fs::read(bench.path("f.npz")).unwrap() == before);
     bench.run("develop f.npz -o b.png").success();
+    // Pictures and reports too.
+    for name in ["a.png", "r.json"] {
+        fs::write(bench.path(name), "kept").unwrap();
+        fs::set_permissions(bench.path(name), fs::Permissions::from_mode(0o444)).unwrap();
+    }
+    for flags in ["-o a.png", "-o b.png --report r.json"] {
+        bench
+            .run(&format!("render box.toml --backend cpu --spp 1 {flags}"))
+            .code(4)
+            .stderr(says("cannot write: it is read-only"));
+    }
+    assert_eq!(fs::read(bench.path("a.png")).unwrap(), b"kept");
 }
 
 /// A device that is always full stands for a full disk.
