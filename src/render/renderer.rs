@@ -1,4 +1,4 @@
-//! Renders on a device that stays open, and goes on with pictures that there are.
+//! Renders on a device that stays open, and resumes pictures.
 
 use super::backend::Device;
 use super::memory::{self, Need};
@@ -90,7 +90,7 @@ impl Renderer {
     }
 }
 
-/// Renders `scene`, or goes on with `held`, on an open device or on one that is opened for it once all is checked.
+/// Renders `scene`, or resumes `held`, on an open device or on one that is opened for it once all is checked.
 pub(super) fn render(
     device: Option<&Device>,
     held: Option<Picture>,
