@@ -20,21 +20,22 @@ fn text(done: &assert_cmd::assert::Assert) -> String {
     String::from_utf8(done.get_output().stdout.clone()).expect("text")
 }
 
-/// Every scene of the repository.
 /// Whether the scene has a surface that no other renderer has.
-fn has_formula(scene: &Path) -> bool {
+fn is_implicit(scene: &Path) -> bool {
     let text = std::fs::read_to_string(scene).expect("a scene");
-    text.contains("[[implicit]]")
+    text.contains("[[implicit]]") || text.contains("[[isosurface]]")
 }
 
 #[test]
-fn formulas_are_refused() {
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/torus.toml");
-    for to in ["mitsuba", "pbrt"] {
-        let done = export(&scene, to, &[]).failure();
-        let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
-        let place = "torus.toml:33:1: an implicit surface has no equal";
-        assert!(said.contains(place) && text(&done).is_empty(), "{said}");
+fn implicit_surfaces_are_refused() {
+    for (name, line) in [("torus", 33), ("density", 35)] {
+        let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+        let place = format!("{name}.toml:{line}:1: an implicit surface has no equal");
+        for to in ["mitsuba", "pbrt"] {
+            let done = export(&scene, to, &[]).failure();
+            let said = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+            assert!(said.contains(&place) && text(&done).is_empty(), "{said}");
+        }
     }
 }
 
@@ -48,7 +49,7 @@ fn scenes() -> Vec<PathBuf> {
         .map(|e| e.expect("an entry").path());
     let mut scenes: Vec<PathBuf> = paths
         .filter(|p| p.extension().is_some_and(|e| e == "toml"))
-        .filter(|p| !has_formula(p))
+        .filter(|p| !is_implicit(p))
         .collect();
     scenes.sort();
     assert!(scenes.len() > 15);
