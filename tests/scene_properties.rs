@@ -13,7 +13,6 @@ use random_scene::scenes;
 use std::fmt::Write;
 use std::io::Write as _;
 use std::path::Path;
-use std::sync::Arc;
 
 /// The scene as a file. Rust writes f64 so that it reads back the same, and as TOML does.
 fn to_toml(scene: &Scene) -> Result<String, std::fmt::Error> {
@@ -168,12 +167,6 @@ fn like(read: &Scene, written: &Scene) -> Scene {
         ) = (&mut a.shape, &b.shape)
         {
             *n = same(*n, *m);
-        }
-        if let (Shape::Implicit(i), Shape::Implicit(j)) = (&mut a.shape, &b.shape) {
-            let difference = (i.rotation - j.rotation).to_cols_array();
-            if difference.iter().all(|x| x.abs() < 1e-15) {
-                Arc::make_mut(i).rotation = j.rotation;
-            }
         }
     }
     read

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 
 /// How far the length of a unit vector may be from 1: a few roundings of f64.
-const UNIT: f64 = 1e-14;
+pub(super) const UNIT: f64 = 1e-14;
 
 /// A scene under construction, begun by [`Scene::builder`]. Vectors are `[f64; 3]` or [`DVec3`].
 ///
@@ -395,8 +395,7 @@ pub(crate) fn checked(scene: &Scene) -> Result<(Scene, String), Vec<Diagnostic>>
     let normals = scene.primitives.iter().all(|p| match p.shape {
         Shape::Plane { normal, .. } | Shape::Disk { normal, .. } => unit(normal),
         Shape::Sphere { .. } | Shape::Cylinder { .. } => true,
-        // A rotation that is read again is the same if it was one.
-        Shape::Implicit(ref implicit) => unit(implicit.rotation.x_axis),
+        Shape::Implicit(ref surface) => implicit::is_orthonormal(surface.rotation),
     });
     let same = normals && scene.lights.iter().all(|l| unit(l.normal)) && unit(scene.camera.up);
     // Normalising twice may move a last bit, and with it samples.

@@ -1,6 +1,7 @@
 //! `[[implicit]]`: its keys, the kinds of value that no other table has, and its text.
 
 use super::Shape;
+use super::build::UNIT;
 use super::format::Table;
 use super::value::{
     Direction, FromNumber as _, Level, Point, Radius, Text, Truth, Value, Wrong, array, number,
@@ -96,7 +97,8 @@ impl Value for Rotation {
             let angle = angle.and_then(|a| number(a.get_ref()));
             let turned = axis.zip(angle.filter(|a| a.is_finite()));
             let (axis, angle) = turned.ok_or_else(|| wrong(found))?;
-            return Ok(Self(DMat3::from_axis_angle(axis.0, angle.to_radians())));
+            let turn = DMat3::from_axis_angle(axis.0, angle.to_radians());
+            return Ok(Self(orthonormal(turn)));
         }
         let [a, b, c] = array(found, |row| array(row, |x| number(x.get_ref())).ok())?;
         let rows = DMat3::from_cols(DVec3::from(a), DVec3::from(b), DVec3::from(c));
@@ -125,11 +127,17 @@ impl Value for Rotation {
     }
 }
 
-/// The same columns, as exactly at right angles as f64 has them. What is so already stays as it is.
-fn orthonormal(m: DMat3) -> DMat3 {
-    const EXACT: f64 = 1e-15;
+/// Whether the columns of `m` are unit vectors at right angles, to some forty roundings: whatever one
+/// step of Gram and Schmidt, or a well-made rotation, leaves.
+pub(super) fn is_orthonormal(m: DMat3) -> bool {
     let product = m.transpose() * m - DMat3::IDENTITY;
-    if product.to_cols_array().iter().all(|x| x.abs() <= EXACT) {
+    product.to_cols_array().iter().all(|x| x.abs() <= UNIT)
+}
+
+/// The columns of `m` as unit vectors at right angles. Columns that are so already keep their bits, so
+/// that a rotation read again is the same.
+fn orthonormal(m: DMat3) -> DMat3 {
+    if is_orthonormal(m) {
         return m;
     }
     let x = m.x_axis.normalize();
@@ -271,4 +279,30 @@ pub(super) fn text(implicit: &Implicit, string: impl Fn(&str) -> String) -> Stri
         implicit.closed
     );
     s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::array::uniform9;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn rotations_read_again_keep_their_bits(
+            axis in uniform3(), angle in -7.0..7.0f64, off in uniform9(-SQUARE / 4.0..SQUARE / 4.0),
+        ) {
+            let turn = DMat3::from_axis_angle(axis, angle);
+            prop_assert_eq!(orthonormal(turn), turn);
+            let read = orthonormal(turn + DMat3::from_cols_array(&off));
+            prop_assert!(is_orthonormal(read), "{}", read);
+            prop_assert!(!is_orthonormal(turn * (1.0 + 3.0 * UNIT)));
+        }
+    }
+
+    fn uniform3() -> impl Strategy<Value = DVec3> {
+        [-1.0..1.0f64, -1.0..1.0, -1.0..1.0]
+            .prop_map(DVec3::from)
+            .prop_filter_map("a direction", DVec3::try_normalize)
+    }
 }
