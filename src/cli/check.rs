@@ -3,7 +3,7 @@
 use super::args::CheckArgs;
 use super::failure::Failure;
 use crate::render::{Backend, Options, render};
-use crate::scene::{Light, Place, Scene, check as lints, parse};
+use crate::scene::{Light, Place, Primitive, Scene, Shape, check as lints, parse};
 use std::path::Path;
 
 /// Reads and lints every file. The exit status is that of the first file that fails.
@@ -41,6 +41,10 @@ const MOST_PAIRS: usize = 1000;
 /// warning.
 pub(super) fn idle_lights(scene: &Scene) -> Vec<Place> {
     if scene.lights.len() * (scene.primitives.len() + 1) > MOST_PAIRS {
+        return Vec::new();
+    }
+    let is_wild = |p: &Primitive| matches!(&p.shape, Shape::Implicit(i) if i.is_wild());
+    if scene.primitives.iter().any(is_wild) {
         return Vec::new();
     }
     let known: Vec<usize> = lints::lint(scene).iter().map(|w| w.line).collect();

@@ -19,8 +19,11 @@ const FINEST: f64 = 1.0 / (1u64 << 42) as f64;
 /// A point that is nearer to the surface than this, relative to its size, is on it.
 const ON_IT: f64 = 1e-10;
 
-/// The most parts of a ray that are looked at.
-const MOST_PARTS: usize = 1 << 20;
+/// The most parts of a ray that are looked at. A ray beyond that ends where the search does.
+const MOST_PARTS: usize = 1 << 16;
+
+/// The same where a guess is good enough.
+const FEW_PARTS: usize = 1 << 9;
 
 /// What is known of the place where a ray starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +45,8 @@ struct Along<'a> {
     sign: f64,
     /// The length below which parts are not divided.
     finest: f64,
+    /// The most parts of the ray that are looked at.
+    most_parts: usize,
 }
 
 impl Along<'_> {
@@ -161,26 +166,34 @@ impl Along<'_> {
 
     /// The same within a part of the ray on which the function is smooth.
     fn first_of_part(&self, low: f64, high: f64) -> Option<f64> {
+        self.isolate(low, high).unwrap_or_else(Some)
+    }
+
+    /// The same. The error is the place where the search was given up.
+    fn isolate(&self, low: f64, high: f64) -> Result<Option<f64>, f64> {
         let mut parts = vec![(low, high)];
-        let mut left = MOST_PARTS;
+        let mut left = self.most_parts;
         while let Some((low, high)) = parts.pop() {
             let Varying { value, slope } = self.over(low, high);
             if value.low > 0.0 {
                 continue;
             }
-            if value.high < 0.0 || left == 0 {
-                return Some(low);
+            if value.high < 0.0 {
+                return Ok(Some(low));
+            }
+            if left == 0 {
+                return Err(low);
             }
             left -= 1;
             if slope.low > 0.0 {
                 if self.over(low, low).value.high < 0.0 {
-                    return Some(low);
+                    return Ok(Some(low));
                 }
                 continue;
             }
             if slope.high < 0.0 {
                 if self.at(high) < 0.0 {
-                    return Some(self.bisect(low, high));
+                    return Ok(Some(self.bisect(low, high)));
                 }
                 continue;
             }
@@ -189,10 +202,10 @@ impl Along<'_> {
                 parts.push((middle, high));
                 parts.push((low, middle));
             } else if self.slope(low) <= 0.0 {
-                return Some(low);
+                return Ok(Some(low));
             }
         }
-        None
+        Ok(None)
     }
 
     /// How far from a root at `start` there is certainly no other, at most `end`.
@@ -216,6 +229,37 @@ impl Along<'_> {
 impl Implicit {
     /// Where the ray o + t d first meets the surface, at t >= 0, and the part that it meets there.
     pub fn meet(&self, o: DVec3, d: DVec3, start: Start) -> Option<(f64, usize)> {
+        self.search(o, d, start, MOST_PARTS)
+    }
+
+    /// The same with bounded work, for warnings: a formula that swings thousands of times along the ray may be met too early.
+    pub(crate) fn meet_roughly(&self, o: DVec3, d: DVec3, start: Start) -> Option<(f64, usize)> {
+        self.search(o, d, start, FEW_PARTS)
+    }
+
+    /// Whether the formula swings so often that rays through the middle of its bounds take thousands of steps.
+    pub(crate) fn is_wild(&self) -> bool {
+        let (middle, half) = self.clip.extent();
+        let reach = half.length();
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE.normalize()];
+        let is_wild = |w: DVec3| {
+            let along = Along {
+                implicit: self,
+                cell: None,
+                q: middle,
+                w,
+                sign: 1.0,
+                finest: FINEST * reach,
+                most_parts: FEW_PARTS,
+            };
+            // To the first root and beyond it.
+            let far = |sign| Along { sign, ..along }.isolate(-reach, reach).is_err();
+            far(1.0) || far(-1.0)
+        };
+        self.formula().is_some() && axes.into_iter().any(is_wild)
+    }
+
+    fn search(&self, o: DVec3, d: DVec3, start: Start, most_parts: usize) -> Option<(f64, usize)> {
         let (q, w) = (self.to_local(o), self.turned_back(d));
         let span = self.clip.span(q, w);
         // The first root of a ray that stands on one, or on none.
@@ -227,6 +271,7 @@ impl Implicit {
                 w,
                 sign,
                 finest: FINEST * self.ball().1,
+                most_parts,
             };
             along.first(from, to, on)
         };
@@ -404,5 +449,17 @@ mod tests {
             None,
             "through"
         );
+    }
+
+    #[test]
+    fn formulas_that_swing_without_end_are_wild() {
+        assert!(!of("(x^2 + y^2 + z^2 + 0.91)^2 - 4 (x^2 + y^2)", 2.0).is_wild());
+        let gyroid = "abs(sin(20 x) cos(20 y) + sin(20 y) cos(20 z) + sin(20 z) cos(20 x)) - 0.2";
+        assert!(!of(gyroid, 2.0).is_wild());
+        assert!(of("tan(x)", 1e12).is_wild());
+        // It has no root, but no interval of some periods tells. Rays through it end nevertheless.
+        let waves = of("sin(x) sin(x + 1) + 0.9", 1e6);
+        assert!(waves.is_wild());
+        assert!(waves.meet_roughly(DVec3::ZERO, DVec3::X, FREE).is_some());
     }
 }

@@ -173,7 +173,8 @@ pub(super) fn hit(shape: &Shape, o: DVec3, d: DVec3) -> Option<f64> {
         }
         Shape::Implicit(ref implicit) => {
             let inside = implicit.holds(o);
-            implicit.meet(o, d, Start { inside, on: None }).map(|h| h.0)
+            let start = Start { inside, on: None };
+            implicit.meet_roughly(o, d, start).map(|h| h.0)
         }
     }
 }
