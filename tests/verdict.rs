@@ -128,6 +128,20 @@ fn false_alarms_are_as_rare_as_stated() {
     check_false_alarms(12, 64);
 }
 
+/// A find of a bright sample is no change: its pixel's error is not that of its neighbours, which found none.
+#[test]
+fn rare_light_gives_no_false_alarms() {
+    let names = ["bulb", "bulb_hollow", "bulb_small", "sparse_spot"];
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/stated_error");
+    let named = |name: &str| {
+        (
+            name.to_owned(),
+            read(&folder.join(name).with_extension("toml")),
+        )
+    };
+    check_false_alarms_of(names.map(named).into(), [64, 48], 6, 256);
+}
+
 #[test]
 #[ignore = "2000 pairs: minutes to an hour"]
 fn false_alarms_in_2000_pairs() {

@@ -12,9 +12,9 @@ pub mod error;
 mod left_out;
 pub mod merge;
 pub mod pilot;
-mod pooled;
 pub mod replicates;
 pub mod splats;
+mod unlit;
 
 use crate::stats::luminance;
 use coverage::{Coverage, Rect};

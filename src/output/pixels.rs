@@ -10,7 +10,7 @@ pub struct Pixels<'a> {
     cell: Vec<u32>,
     counts: Vec<[u64; REPLICATES]>,
     /// Errors of pixels that share theirs with their neighbours.
-    shared: Option<Vec<Option<[f32; 4]>>>,
+    unlit: Option<Vec<Option<[f32; 4]>>>,
     covered: u64,
 }
 
@@ -32,7 +32,7 @@ impl<'a> Pixels<'a> {
             film,
             cell,
             counts,
-            shared: film.shared_errors(),
+            unlit: film.errors_of_unlit(),
             covered,
         }
     }
@@ -45,7 +45,7 @@ impl<'a> Pixels<'a> {
         let cell = self.cell[self.film.index(x, y)];
         let counts = self.counts.get((cell as usize).checked_sub(1)?)?;
         let mut estimate = self.film.estimate(x, y, counts);
-        if let Some(errors) = self.shared.as_ref().and_then(|s| s[self.film.index(x, y)]) {
+        if let Some(errors) = self.unlit.as_ref().and_then(|s| s[self.film.index(x, y)]) {
             estimate.error = errors.map(f64::from);
         }
         Some(estimate)

@@ -285,40 +285,45 @@ fn small_errors_are_those_of_the_textbook() {
 
 /// On the left light is rare, on the right there is nothing to meet.
 #[test]
-fn pixels_without_light_share_the_error_of_those_that_found_some() {
+fn pixels_without_light_are_wrong_by_the_light_that_others_found() {
     let source = |x: u32, _| Source {
         base: 0.0,
         flash: 3.0,
         chance: if x < 24 { 1e-3 } else { 0.0 },
     };
     let mut film = simulated(source, 1);
-    assert_eq!(film.shared_errors(), None, "nothing is known of surfaces");
+    assert_eq!(film.errors_of_unlit(), None, "nothing is known of surfaces");
     for y in 0..SIZE[1] {
         for x in 0..24 {
             film.reach(x, y, Reach::Further);
         }
     }
-    let shared = film.shared_errors().unwrap();
-    let truth = (source(0, 0).variance() / SAMPLES as f64).sqrt();
-    let (mut least, mut most, mut squares) = (f64::INFINITY, 0.0f64, 0.0);
-    for (i, error) in shared.iter().enumerate() {
-        if i % SIZE[0] as usize >= 24 {
-            assert_eq!(*error, None);
-            continue;
+    let unlit = film.errors_of_unlit().unwrap();
+    let truth = source(0, 0).mean();
+    let counts = [SAMPLES / 4; REPLICATES];
+    let (mut least, mut most, mut squares, mut far) = (f64::INFINITY, 0.0f64, 0.0, 0);
+    for (i, error) in unlit.iter().enumerate() {
+        let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
+        let own = film.estimate(x, y, &counts);
+        assert_eq!(error.is_some(), x < 24 && own.mean[0] == 0.0, "pixel {i}");
+        // All four numbers are the same: the light is grey.
+        if let Some([r, g, b, y]) = *error {
+            assert!(r == g && g == b && (y / r - 1.0).abs() < 1e-6);
+            least = least.min(f64::from(y) / truth);
+            most = most.max(f64::from(y) / truth);
         }
-        // All four numbers are the same: the light is grey. A pixel that has found light twice keeps its error.
-        let own = film.total(i as u32 % SIZE[0], i as u32 / SIZE[0]);
-        let found = own.iter().map(|s| s[3]).sum::<f64>() / 9.0;
-        assert_eq!(error.is_none(), found > 1.5, "pixel {i}");
-        let Some([r, g, b, y]) = *error else { continue };
-        assert!(r == g && g == b && (y / r - 1.0).abs() < 1e-6);
-        least = least.min(f64::from(y) / truth);
-        most = most.max(f64::from(y) / truth);
-        squares += (f64::from(y) / truth).powi(2);
+        if x < 24 {
+            let error = error.map_or(own.error[3], |e| f64::from(e[3]));
+            squares += error * error;
+            far += usize::from((own.mean[0] - truth).abs() > 3.0 * error);
+        }
     }
-    let mean = (squares / (PIXELS / 2.0)).sqrt();
-    println!("{least} to {most}, {mean}");
-    assert!(least > 0.5 && most < 1.6 && (0.9..1.1).contains(&mean));
+    let half = PIXELS / 2.0;
+    let whole = (squares / half / (source(0, 0).variance() / SAMPLES as f64)).sqrt();
+    println!(
+        "{least} to {most} of the missing light; all errors {whole}; {far} of {half} pixels too far off"
+    );
+    assert!(least > 0.5 && most < 1.6 && (0.9..1.15).contains(&whole) && far == 0);
 }
 
 /// A rare flash on a steady light stays with the pixel that has found it.
@@ -333,5 +338,5 @@ fn pixels_with_light_keep_their_own_errors() {
     for y in 0..SIZE[1] {
         (0..SIZE[0]).for_each(|x| film.reach(x, y, Reach::Further));
     }
-    assert_eq!(film.shared_errors(), None);
+    assert_eq!(film.errors_of_unlit(), None);
 }

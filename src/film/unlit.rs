@@ -1,18 +1,24 @@
-//! The errors of pixels that have found no light, among others that have found none.
+//! The errors of pixels that have found no light, among others that have found little.
 //!
-//! Such a pixel's samples agree by chance: all are zero. Its standard error is not zero. It is the same as that of its neighbours,
-//! a few of which have found a bright sample and state an error that is too large for themselves alone. So these pixels share the
-//! mean of their squared errors. That leaves the sum of the squares as it was, which is right on average.
+//! The samples of such a pixel agree by chance: all are zero. Its standard error is not zero. What it is wrong by is the light that it
+//! should have, and its neighbours tell how much that is: a few of them have found a bright sample. So its error is their mean light, with
+//! the dark ones among them.
+//!
+//! A pixel that has found such a sample keeps what it states, about as much as it has found: that is what it is wrong by. If λ is the share
+//! of the pixels that have found one, of light h, then the squared errors are (λ h)² for most and h² for a share of λ, as they are in truth.
+//! With their root mean square √λ h for all of them, a pixel with light would be off by 1/√λ of its errors, and two pictures of the same
+//! scene would differ by more than they state.
 //!
 //! A pixel of few samples may be dark without light being rare, so pixels with fewer than [`ENOUGH`] keep what they state.
 
 use super::{Film, REPLICATES, replicate_counts};
+use crate::stats::luminance;
 use rayon::prelude::*;
 
-/// A pixel shares its error if its light has come from fewer samples than this, after Kish \[Kish1965\]: from none or one.
-const FEW: f64 = 2.0;
+/// A pixel has found little if its light has come from at most so many samples, after Kish \[Kish1965\].
+const LITTLE: f64 = 4.0;
 
-/// Samples that must carry the light of those that share.
+/// Samples that must carry the light of those that have found little.
 const ENOUGH: f64 = 16.0;
 
 /// Radii of the squares that are tried, in pixels.
@@ -21,39 +27,37 @@ const RADII: [usize; 5] = [1, 3, 7, 15, 31];
 /// Rows that are worked on together, without the margin of the largest square.
 const BAND: usize = 256;
 
-/// Sums over a rectangle of pixels that may share: how many they are, how many have no light, their light and its squares, and the
-/// squared errors of R, G, B and luminance.
-type Sums = [f64; 8];
+/// Sums over the pixels of a rectangle that have found little: how many they are, how many have no light, the luminance of their samples
+/// and its squares, and their radiance in R, G and B.
+type Sums = [f64; 7];
 
 impl Film {
-    /// The errors of the pixels of the film's bounds that share theirs with their neighbours, row by row; `None` for the others, and
-    /// in all where no pixel does.
-    pub(crate) fn shared_errors(&self) -> Option<Vec<Option<[f32; 4]>>> {
+    /// The errors of R, G, B and luminance of the pixels of the film's bounds that have found no light where some must be, row by row;
+    /// `None` for the others, and in all where there are none.
+    pub(crate) fn errors_of_unlit(&self) -> Option<Vec<Option<[f32; 4]>>> {
         if self.reached.is_empty() {
             return None;
         }
         let width = self.bounds.width() as usize;
         let height = self.bounds.height() as usize;
         let pixels = self.light();
-        let may_share =
-            |i: usize| pixels[i].n >= ENOUGH && pixels[i].carriers() < FEW && self.reached[i] > 0;
-        let any = (0..pixels.len())
-            .into_par_iter()
-            .any(|i| may_share(i) && pixels[i].sum == 0.0);
-        if !any {
+        let found_little = |i: usize| {
+            pixels[i].n >= ENOUGH && pixels[i].carriers() <= LITTLE && self.reached[i] > 0
+        };
+        let is_unlit = |i: usize| found_little(i) && pixels[i].sum == 0.0;
+        if !(0..pixels.len()).into_par_iter().any(is_unlit) {
             return None;
         }
-        let errors = self.squared_errors();
+        let radiance = self.means();
         let mut out = vec![None; pixels.len()];
         let margin = RADII[RADII.len() - 1];
         for (band, rows) in out.chunks_mut(BAND * width).enumerate() {
             let first = (band * BAND).saturating_sub(margin);
             let last = ((band + 1) * BAND + margin).min(height);
             let item = |i: usize| -> Sums {
-                let (p, e) = (&pixels[i], &errors[i]);
-                if may_share(i) {
-                    let dark = f64::from(p.sum == 0.0);
-                    [1.0, dark, p.sum, p.squares, e[0], e[1], e[2], e[3]]
+                let (p, [r, g, b]) = (&pixels[i], radiance[i]);
+                if found_little(i) {
+                    [1.0, f64::from(p.sum == 0.0), p.sum, p.squares, r, g, b]
                 } else {
                     Sums::default()
                 }
@@ -61,26 +65,26 @@ impl Film {
             let table = Table::new(width, first..last, item);
             rows.par_iter_mut().enumerate().for_each(|(k, out)| {
                 let i = band * BAND * width + k;
-                if may_share(i) {
-                    *out = table.shared(i % width, i / width);
+                if is_unlit(i) {
+                    *out = table.missing_light(i % width, i / width);
                 }
             });
         }
         Some(out)
     }
 
-    /// The squared errors of R, G, B and luminance of every pixel.
-    fn squared_errors(&self) -> Vec<[f64; 4]> {
-        let mut errors = vec![[0.0; 4]; self.bounds.area() as usize];
+    /// The mean radiance of every pixel.
+    fn means(&self) -> Vec<[f64; 3]> {
+        let mut means = vec![[0.0; 3]; self.bounds.area() as usize];
         for (rect, ranges) in self.coverage.cells() {
             let counts: [u64; REPLICATES] = replicate_counts(ranges, self.strata);
             for y in rect.y0..rect.y1 {
                 for x in rect.x0..rect.x1 {
-                    errors[self.index(x, y)] = self.estimate(x, y, &counts).error.map(|e| e * e);
+                    means[self.index(x, y)] = self.estimate(x, y, &counts).mean;
                 }
             }
         }
-        errors
+        means
     }
 }
 
@@ -113,8 +117,8 @@ impl Table {
         }
     }
 
-    /// The errors that pixel (x, y) shares, if most of those that share them have found no light.
-    fn shared(&self, x: usize, y: usize) -> Option<[f32; 4]> {
+    /// The mean light around (x, y), in R, G, B and luminance, if most of the pixels there that have found little have found none.
+    fn missing_light(&self, x: usize, y: usize) -> Option<[f32; 4]> {
         let [width, height] = [self.columns - 1, self.rows.len()];
         let y = y - self.rows.start;
         let mut sums = Sums::default();
@@ -129,8 +133,9 @@ impl Table {
                 break;
             }
         }
-        let [count, dark, _, _, errors @ ..] = sums;
-        let share = |e: f64| (e.max(0.0) / count).sqrt() as f32;
-        (2.0 * dark > count).then_some(errors.map(share))
+        let [count, dark, _, _, light @ ..] = sums;
+        let [r, g, b] = light.map(|l| l.max(0.0) / count);
+        let errors = [r, g, b, luminance([r, g, b])].map(|e| e as f32);
+        (2.0 * dark > count).then_some(errors)
     }
 }
