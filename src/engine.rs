@@ -73,7 +73,7 @@ pub trait Engine {
             let (splats, more) = self.trace_light(passes.clone(), stop)?;
             counters += more;
             let width = film.size[0];
-            traced.push((Passes::new(passes, width, &splats), rects));
+            traced.push((Passes::new(passes, width, splats), rects));
         }
         counters += self.render_parts(film, rect, &[Part { rect, samples }], stop)?;
         for (passes, rects) in traced {

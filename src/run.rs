@@ -250,7 +250,7 @@ impl<'a> Run<'a> {
                     let width = film.size[0];
                     splats.retain(|s| s.is_within(film.bounds, width));
                     count += splats.len() as u64;
-                    passes.push(Passes::new(numbers, width, &splats));
+                    passes.push(Passes::new(numbers, width, splats));
                 };
                 if !self.trace_light(at..end, &mut after, keep)? {
                     return Ok(StopReason::Interrupted);

@@ -111,9 +111,9 @@ mod tests {
         let splats: Vec<Splat> = (0..4)
             .map(|r| Splat::new([2, 1], SIZE[0], r, [0.5 * r as f32; 3]))
             .collect();
-        film.put_passes(whole, &Passes::new(0..3, SIZE[0], &splats[..3]));
+        film.put_passes(whole, &Passes::new(0..3, SIZE[0], splats[..3].to_vec()));
         assert_eq!(film.replicates_apart(), Err(NoReplicates::NoPasses));
-        film.put_passes(whole, &Passes::new(3..4, SIZE[0], &splats[3..]));
+        film.put_passes(whole, &Passes::new(3..4, SIZE[0], splats[3..].to_vec()));
         let apart = film.replicates_apart().unwrap();
         let of = |r: usize, i: usize| apart.means[r][i][1];
         for r in 0..REPLICATES {

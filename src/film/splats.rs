@@ -85,24 +85,27 @@ pub struct Passes {
 
 impl Passes {
     /// The passes of these numbers have these splats on a picture that is so wide, in any order.
-    pub fn new(numbers: Range<u64>, width: u32, splats: &[Splat]) -> Self {
+    pub fn new(numbers: Range<u64>, width: u32, mut splats: Vec<Splat>) -> Self {
         let row = |s: &Splat| s.pixel(width)[1] as usize;
         let mut rows = vec![0; splats.iter().map(row).max().map_or(1, |last| last + 2)];
         splats.iter().for_each(|s| rows[row(s) + 1] += 1);
         for y in 1..rows.len() {
             rows[y] += rows[y - 1];
         }
+        // Each splat is swapped into the next place of its row. A sorted copy would take as much memory again.
         let mut next = rows.clone();
-        let mut sorted = splats.to_vec();
-        for splat in splats {
-            let at = &mut next[row(splat)];
-            sorted[*at] = *splat;
-            *at += 1;
+        for y in 0..rows.len() - 1 {
+            while next[y] < rows[y + 1] {
+                let at = next[y];
+                let home = row(&splats[at]);
+                splats.swap(at, next[home]);
+                next[home] += 1;
+            }
         }
         Self {
             numbers,
             width,
-            splats: sorted,
+            splats,
             rows,
         }
     }
@@ -377,12 +380,12 @@ mod tests {
         let faint = |k: u32| splat(1, 0, [1e-12 * (1.0 + k as f32 * 1e-4), 3.0, 7.5]);
         let mut all: Vec<Splat> = (0..4000).map(faint).collect();
         let [mut one, mut other] = [film(), film()];
-        one.put_passes(Rect::whole(SIZE), &Passes::new(0..4, SIZE[0], &all));
+        one.put_passes(Rect::whole(SIZE), &Passes::new(0..4, SIZE[0], all.clone()));
         all.reverse();
         let (a, b) = all.split_at(1234);
         let whole = Rect::whole(SIZE);
-        other.put_passes(whole, &Passes::new(0..2, SIZE[0], a));
-        other.put_passes(whole, &Passes::new(2..4, SIZE[0], b));
+        other.put_passes(whole, &Passes::new(0..2, SIZE[0], a.to_vec()));
+        other.put_passes(whole, &Passes::new(2..4, SIZE[0], b.to_vec()));
         assert_eq!(one, other);
         let light = one.all_light(1, 0, &[1; REPLICATES]);
         let expected: f64 = all.iter().map(|s| f64::from(s.value[0])).sum();
@@ -397,7 +400,7 @@ mod tests {
         let whole = Rect::whole(SIZE);
         film.put_samples(whole, 0..8, vec![[[2.0, 2.0, 2.0, 2.0]; REPLICATES]; 6]);
         let passes: Vec<Splat> = (0..4).map(|r| splat(2, r, [r as f32 + 1.0; 3])).collect();
-        film.put_passes(whole, &Passes::new(0..4, SIZE[0], &passes));
+        film.put_passes(whole, &Passes::new(0..4, SIZE[0], passes));
         let counts = [2; REPLICATES];
         assert_eq!(film.estimate(0, 0, &counts).mean, [1.0; 3]);
         let lit = film.estimate(2, 0, &counts);
@@ -415,7 +418,7 @@ mod tests {
             ..Rect::whole(SIZE)
         };
         let all = [splat(2, 0, [1.0; 3]), splat(0, 0, [1.0; 3])];
-        film.put_passes(left, &Passes::new(0..1, SIZE[0], &all));
+        film.put_passes(left, &Passes::new(0..1, SIZE[0], all.to_vec()));
         assert!(film.splats().expect("splats").sums()[2][0][0] == 0);
         assert!(film.splats().expect("splats").sums()[0][0][0] > 0);
     }

@@ -106,7 +106,7 @@ impl Run<'_> {
             // How far a tile gets depends on its noise, so all pixels get as many passes as samples on average.
             for (lacking, rects) in self.film.lacking_passes(&job.tiles, 0..next) {
                 let put = |film: &mut Film, numbers, splats: Vec<_>| {
-                    let passes = Passes::new(numbers, film.size[0], &splats);
+                    let passes = Passes::new(numbers, film.size[0], splats);
                     rects.iter().for_each(|r| film.put_passes(*r, &passes));
                 };
                 if !self.trace_light(lacking, &mut after, put)? {

@@ -233,7 +233,10 @@ fn light_that_mirrors_show_is_in_doubt_until_it_was_found() {
             paths: 64,
             scale: brightest,
         });
-        film.put_passes(Rect::whole(SIZE), &Passes::new(0..SAMPLES, SIZE[0], &[]));
+        film.put_passes(
+            Rect::whole(SIZE),
+            &Passes::new(0..SAMPLES, SIZE[0], Vec::new()),
+        );
         for k in 0..SIZE[0] * SIZE[1] {
             let how = if k < found {
                 Reach::Found
