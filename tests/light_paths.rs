@@ -418,7 +418,7 @@ fn the_same_bits_however_the_passes_are_cut() {
         for &(rect, from, to) in cuts {
             let (splats, counters) = engine.trace_light(from..to, &stop).expect("passes");
             assert!(counters.light_paths > 0);
-            film.put_passes(rect, &Passes::new(from..to, SIZE[0], &splats));
+            film.put_passes(rect, &Passes::new(from..to, SIZE[0], splats));
         }
         film
     };
