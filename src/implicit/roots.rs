@@ -238,7 +238,7 @@ impl Implicit {
     }
 
     /// Whether the formula swings so often that rays through the middle of its bounds take thousands of steps.
-    pub(crate) fn is_wild(&self) -> bool {
+    pub fn is_wild(&self) -> bool {
         let (middle, half) = self.clip.extent();
         let reach = half.length();
         let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE.normalize()];
