@@ -38,7 +38,7 @@ pub(super) const PATHS: u64 = SIZE[0] as u64 * SIZE[1] as u64 * SAMPLES;
 const MOST_PAIRS: usize = 1000;
 
 /// Where the lights stand that a small picture shows nothing of. Lights that emit nothing, or are known to be hidden, have another
-/// warning.
+/// warning. Scenes of very many things, and of formulas that the reference would take minutes for, are not looked at.
 pub(super) fn idle_lights(scene: &Scene) -> Vec<Place> {
     if scene.lights.len() * (scene.primitives.len() + 1) > MOST_PAIRS {
         return Vec::new();

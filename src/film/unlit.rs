@@ -15,7 +15,8 @@ use super::{Film, REPLICATES, replicate_counts};
 use crate::stats::luminance;
 use rayon::prelude::*;
 
-/// A pixel has found little if its light has come from at most so many samples, after Kish \[Kish1965\].
+/// A pixel has found little if its light has come from at most so many samples, after Kish \[Kish1965\]. Where half of the
+/// pixels have found none, one in a thousand has found more.
 const LITTLE: f64 = 4.0;
 
 /// Samples that must carry the light of those that have found little.

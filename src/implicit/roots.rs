@@ -22,7 +22,7 @@ const ON_IT: f64 = 1e-10;
 /// The most parts of a ray that are looked at. A ray beyond that ends where the search does.
 const MOST_PARTS: usize = 1 << 16;
 
-/// The same where a guess is good enough.
+/// The same where a guess is good enough: some times what torus and gyroid need.
 const FEW_PARTS: usize = 1 << 9;
 
 /// What is known of the place where a ray starts.
@@ -232,31 +232,31 @@ impl Implicit {
         self.search(o, d, start, MOST_PARTS)
     }
 
-    /// The same with bounded work, for warnings: a formula that swings thousands of times along the ray may be met too early.
+    /// The same with bounded work, for warnings: a formula that swings hundreds of times along the ray may be met too early.
     pub(crate) fn meet_roughly(&self, o: DVec3, d: DVec3, start: Start) -> Option<(f64, usize)> {
         self.search(o, d, start, FEW_PARTS)
     }
 
-    /// Whether the formula swings so often that rays through the middle of its bounds take thousands of steps.
+    /// Whether the formula swings so often that some of four lines through the middle of its bounds take more than [`FEW_PARTS`] parts,
+    /// whether they begin inside or outside.
     pub fn is_wild(&self) -> bool {
         let (middle, half) = self.clip.extent();
         let reach = half.length();
-        let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE.normalize()];
-        let is_wild = |w: DVec3| {
+        let lines = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE.normalize()];
+        let given_up = |w: DVec3, sign: f64| {
             let along = Along {
                 implicit: self,
                 cell: None,
                 q: middle,
                 w,
-                sign: 1.0,
+                sign,
                 finest: FINEST * reach,
                 most_parts: FEW_PARTS,
             };
-            // To the first root and beyond it.
-            let far = |sign| Along { sign, ..along }.isolate(-reach, reach).is_err();
-            far(1.0) || far(-1.0)
+            along.isolate(-reach, reach).is_err()
         };
-        self.formula().is_some() && axes.into_iter().any(is_wild)
+        let is_wild = |w: DVec3| given_up(w, 1.0) || given_up(w, -1.0);
+        self.formula().is_some() && lines.into_iter().any(is_wild)
     }
 
     fn search(&self, o: DVec3, d: DVec3, start: Start, most_parts: usize) -> Option<(f64, usize)> {

@@ -22,7 +22,7 @@ pub struct DevelopArgs {
     /// Picture to write, .exr or .png. Repeatable
     #[arg(short, long, required_unless_present = "folds", value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// With layers or denoising: the film's scene file, if the film lies elsewhere and its scene has tables in other files
+    /// With layers or denoising: the film's scene file, if the film lies elsewhere and its scene names other files (rows, volumes)
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
     /// How pictures are written.
