@@ -6,9 +6,14 @@ struct Interaction {
     p: vec3f,
     // Unit normal on the side of the ray.
     n: vec3f,
+#if SMOOTH
+    // That of the surface itself. n is the one that light is scattered about: smooth, so it may turn away from the ray, but not at mirrors
+    // and glass.
+    geometric: vec3f,
+#endif
     // Unit direction that the ray came from.
     wo: vec3f,
-    // |n . wo|.
+    // n . wo, at least 0.
     cos_o: f32,
     // The ray came from the normal's own side: from outside a solid.
     outside: bool,

@@ -145,7 +145,11 @@ fn advance(path: ptr<function, LightPath>, meets: bool, hit: Hit, work: ptr<func
     // The vertex on the light counts too.
     let last = path.depth + 1u >= LAST_DEPTH;
     path.depth += 1u;
+#if SMOOTH
+    let beta = path.beta * (scattered.weight * adjoint(&x, scattered.wi));
+#else
     let beta = path.beta * scattered.weight;
+#endif
     let brightest = fmax(fmax(beta.x, beta.y), beta.z);
     let survival = fmin(1.0, brightest / fmax(path.start, TINY));
     path.beta = beta * (1.0 / fmax(survival, TINY));
@@ -160,12 +164,20 @@ fn splat_if(wanted: bool, path: ptr<function, LightPath>, x: ptr<function, Inter
     let d = to * (1.0 / fmax(r, TINY));
     let place = CAMERA_CENTER - vec2f(dot(to, CAMERA_DX), dot(to, CAMERA_DY)) * (CAMERA_SCALE / fmax(along, TINY));
     let in_view = along > 0.0 && all(place >= vec2f(0.0)) && all(place < 2.0 * CAMERA_CENTER);
+#if SMOOTH
+    let cos = select(0.0, dot(x.geometric, d), dot(x.n, d) > 0.0);
+#else
     let cos = dot(x.n, d);
+#endif
     if wanted && in_view && cos > 0.0 {
         let bsdf = evaluate_bsdf(x, d);
         let turns = fmin(path.turned * cos_over_pdf_back(x, d, bsdf.pdf), 1.0e30);
         let ratio = path.density * turns * pixel_spread(r, along);
+#if SMOOTH
+        let value = path.beta * (bsdf.f_cos * (adjoint(x, d) * turns / fmax(ratio + cos, TINY)));
+#else
         let value = path.beta * (bsdf.f_cos * (turns / fmax(ratio + cos, TINY)));
+#endif
         let y = value.x + value.y + value.z;
         if y > 0.0 {
             work.counts.y += 1u;

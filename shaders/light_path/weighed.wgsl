@@ -19,10 +19,19 @@ fn begin_trail(path: ptr<function, Path>, ended: bool) {
 // At a surface that the path met at distance t and leaves as `scattered`.
 fn follow_trail(path: ptr<function, Path>, x: ptr<function, Interaction>, t: f32, scattered: Scattered) {
     let along = t * -dot(x.wo, CAMERA_FORWARD);
+#if SMOOTH
+    let spread = pixel_spread(t, along) / fmax(dot(x.geometric, x.wo), TINY);
+#else
     let spread = pixel_spread(t, along) / fmax(x.cos_o, TINY);
+#endif
     let first = spread * cos_over_pdf(x, scattered.wi, scattered.pdf);
     let later = path.trail.ratio * turned(x, scattered.wi, scattered.pdf);
+#if SMOOTH
+    // No light path leaves to where the smooth normal turns away.
+    let ratio = select(select(later, first, path.depth == 1u), 0.0, x.cos_o <= 0.0);
+#else
     let ratio = select(later, first, path.depth == 1u);
+#endif
     path.trail.ratio = select(fmin(ratio, 1.0e30), path.trail.ratio, scattered.specular);
     path.trail.by = select(path.trail.by, x.number, scattered.specular);
 }

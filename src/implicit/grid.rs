@@ -19,6 +19,8 @@ pub struct Grid {
     pub spacing: DVec3,
     /// Whether the solid is where the volume has more than the level, and not less.
     pub above: bool,
+    /// Whether light is scattered about [smooth normals](Self::smooth_gradient), and not about those of the cells.
+    pub smooth: bool,
 }
 
 impl Grid {
@@ -30,6 +32,7 @@ impl Grid {
             order: AxisOrder::Zyx,
             spacing: spacing.into(),
             above: true,
+            smooth: false,
         }
     }
 
@@ -65,6 +68,26 @@ impl Grid {
         let cell = self.heights_of(at, level);
         let f = g - corner(at);
         (cell.value(f), cell.gradient(f) / self.spacing)
+    }
+
+    /// The gradient of the function times [`gain`](Self::gain) at a point of the surface's space, by differences of its values a cell
+    /// before and a cell behind it along each axis; less than a cell where the volume ends. It is continuous, other than that of the cells.
+    pub fn smooth_gradient(&self, q: DVec3, level: f64) -> DVec3 {
+        let g = self.in_cells(q);
+        let most = DVec3::from_array(self.volume.cells().map(|n| n as f64));
+        let value = |g: DVec3| {
+            let at = self.volume.cell_at(g);
+            self.heights_of(at, level).value(g - corner(at))
+        };
+        let along = |k: usize| {
+            let step = DVec3::AXES[k];
+            let (low, high) = (
+                (g - step).clamp(DVec3::ZERO, most),
+                (g + step).clamp(DVec3::ZERO, most),
+            );
+            (value(high) - value(low)) / (high[k] - low[k])
+        };
+        DVec3::new(along(0), along(1), along(2)) / self.spacing
     }
 
     /// The values at the corners of a cell less the level, times the gain.

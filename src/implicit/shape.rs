@@ -259,7 +259,7 @@ impl Implicit {
                 }
             }
             Function::Grid(grid) => {
-                words.push(u64::from(grid.above));
+                words.extend([u64::from(grid.above), u64::from(grid.smooth)]);
                 let digest = grid.volume.digest();
                 let (eights, _) = digest.as_chunks();
                 words.extend(eights.iter().map(|b| u64::from_le_bytes(*b)));
@@ -310,6 +310,22 @@ impl Implicit {
                 (value - self.level, gradient)
             }
             Function::Grid(grid) => grid.sloped(q, self.level),
+        }
+    }
+
+    /// The unit normal about which light is scattered at `p` in the scene, where the surface's own normal is `normal`. It is on the
+    /// same side. Caps, formulas and the cells of volumes have no other normal.
+    pub fn shading_normal(&self, p: DVec3, normal: DVec3, cap: bool) -> DVec3 {
+        let Some(grid) = self.grid().filter(|g| g.smooth && !cap) else {
+            return normal;
+        };
+        let gradient = grid.smooth_gradient(self.to_local(p), self.level);
+        let smooth = (self.rotation * gradient).normalize_or(normal);
+        // Where the volume is coarser than what it shows, differences may point anywhere.
+        if smooth.dot(normal) > 0.0 {
+            smooth
+        } else {
+            normal
         }
     }
 

@@ -53,10 +53,12 @@ pub(super) enum Flag {
     Implicit,
     /// There are surfaces with several parts.
     Parts,
+    /// There are surfaces with smooth normals.
+    Smooth,
 }
 
 impl Flag {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Cylinder,
         Self::Flat,
         Self::Round,
@@ -65,6 +67,7 @@ impl Flag {
         Self::ExtremeLights,
         Self::Implicit,
         Self::Parts,
+        Self::Smooth,
     ];
 
     fn name(self) -> &'static str {
@@ -77,6 +80,7 @@ impl Flag {
             Self::ExtremeLights => "EXTREME_LIGHTS",
             Self::Implicit => "IMPLICIT",
             Self::Parts => "PARTS",
+            Self::Smooth => "SMOOTH",
         }
     }
 
@@ -97,6 +101,8 @@ pub(super) struct Features {
     pub has_formulas: bool,
     /// There are those of volumes.
     pub has_volumes: bool,
+    /// Some of those have smooth normals.
+    pub has_smooth_normals: bool,
     lit_caps: bool,
     extreme_lights: bool,
     /// Lights are sampled.
@@ -167,6 +173,7 @@ impl Features {
             shapes: shapes.collect(),
             has_formulas: implicit().any(|s| s.grid().is_none()),
             has_volumes: implicit().any(|s| s.grid().is_some()),
+            has_smooth_normals: implicit().any(|s| s.grid().is_some_and(|g| g.smooth)),
             lit_caps: world.primitives.iter().any(lit),
             extreme_lights: world
                 .lights
@@ -196,6 +203,7 @@ impl Features {
             shapes: ShapeKind::FIXED.into_iter().collect(),
             has_formulas: false,
             has_volumes: false,
+            has_smooth_normals: false,
             lit_caps: false,
             extreme_lights: false,
             light_sampling: probe.glossy,
@@ -279,6 +287,7 @@ impl Features {
             Flag::LitCaps => self.lit_caps,
             Flag::ExtremeLights => self.extreme_lights,
             Flag::Implicit => self.has_implicit(),
+            Flag::Smooth => self.has_smooth_normals,
             Flag::Parts => any(&[ShapeKind::Cylinder, ShapeKind::Implicit]),
         }
     }

@@ -44,6 +44,7 @@ modules! {
     IMPLICIT_BOUNDS = "implicit/bounds",
     IMPLICIT_CELLS = "implicit/cells",
     IMPLICIT_GRID = "implicit/grid",
+    IMPLICIT_SMOOTH = "implicit/smooth",
     IMPLICIT_SURFACE = "implicit/surface",
     BUFFERS = "fetch/buffers",
     RECORDS = "fetch/records",
@@ -53,11 +54,13 @@ modules! {
     LEAF_DISK = "tree/disk",
     LEAF_CYLINDER = "tree/cylinder",
     INTERACTION = "interaction",
+    ADJOINT = "bsdf/adjoint",
     COSINE = "bsdf/cosine",
     DIFFUSE = "bsdf/diffuse",
     MIRROR = "bsdf/mirror",
     DIELECTRIC = "bsdf/dielectric",
     PHONG = "bsdf/phong",
+    SMOOTH = "bsdf/smooth",
     DISK_LIGHT = "light/disk",
     LIGHT_WEIGHT = "light/weight",
     RECEIVER_MATT = "light/receiver_matt",
@@ -152,6 +155,7 @@ pub(super) fn of_light_paths(f: &Features) -> Vec<Module> {
         scattering(f),
         VERTEX,
     ];
+    modules.extend(f.has_smooth_normals.then_some(ADJOINT));
     modules.extend(match f.access {
         _ if f.counts_trips() => [TRIPS_COUNTED, LIGHT_PATH_BRANCHING],
         Access::Baked => [TRIPS_UNLIMITED, LIGHT_PATH_STRAIGHT],
@@ -211,6 +215,7 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
         modules.push(COSINE);
     }
     modules.extend(f.materials().map(of_material));
+    modules.extend(f.has_smooth_normals.then_some(SMOOTH));
     modules.push(DISK_LIGHT);
     modules.push(if glossy {
         RECEIVER_GLOSSY

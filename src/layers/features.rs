@@ -98,7 +98,7 @@ fn follow(view: &View, finder: &Finder, ray: Ray, seen: &mut Seen) {
         match (hit.met, view.bsdf(&hit)) {
             (Met::Light { index, front }, _) => {
                 seen.albedo += weight;
-                seen.normal += hit.normal * weight.max_element();
+                seen.normal += hit.shading * weight.max_element();
                 if front && view.emitted {
                     let scales = world.light_scales.as_ref();
                     let scale = scales.map_or(1.0, |s| s[ray.medium as usize]);
@@ -109,14 +109,14 @@ fn follow(view: &View, finder: &Finder, ray: Ray, seen: &mut Seen) {
             (_, Some(&Bsdf::Mirror { reflectance })) => branch(weight * reflectance, true),
             (Met::Primitive(index), Some(&Bsdf::Dielectric { ior, transmittance })) => {
                 let eta = Boundary::new(view.primitive(index), ior, ray.medium).eta;
-                let cosine = (-hit.normal.dot(ray.direction)).clamp(0.0, 1.0);
+                let cosine = (-hit.facing(ray.direction).dot(ray.direction)).clamp(0.0, 1.0);
                 let through = fresnel(cosine, eta).transmittance;
                 branch(weight * (1.0 - through), true);
                 branch(weight * transmittance * through, false);
             }
             (_, Some(bsdf)) => {
                 seen.albedo += weight * albedo(bsdf);
-                seen.normal += hit.normal * weight.max_element();
+                seen.normal += hit.shading * weight.max_element();
             }
             (_, None) => {}
         }

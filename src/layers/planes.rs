@@ -79,7 +79,7 @@ impl Pixel {
         let world = &view.world;
         self.hits += 1;
         self.albedo += view.bsdf(hit).map_or(DVec3::ZERO, albedo);
-        self.normal += hit.normal;
+        self.normal += hit.shading;
         self.position += hit.point;
         self.depth += hit.t * ray.direction.dot(world.camera.forward);
         let met = (view.number(hit), view.material(hit));

@@ -176,10 +176,10 @@ impl Tracer {
             let Some((wi, pdf)) = light::sample(&lights[index], hit.point, [u[1], u[2]]) else {
                 continue;
             };
-            let Some((f, material_pdf)) = evaluate(material, hit.normal, wo, wi) else {
+            let Some((f, material_pdf)) = evaluate(material, hit.shading, wo, wi) else {
                 break;
             };
-            if f == DVec3::ZERO {
+            if f == DVec3::ZERO || !hit.leads_to_side(wi, false) {
                 continue;
             }
             let shadow = Ray {
@@ -194,7 +194,7 @@ impl Tracer {
             }
             let density = f64::from(count) * probability * pdf;
             let weight = power_heuristic(density, material_pdf);
-            sum += f * (hit.normal.dot(wi) * weight / density) * lights[index].emitted;
+            sum += f * (hit.shading.dot(wi) * weight / density) * lights[index].emitted;
         }
         sum
     }
@@ -221,6 +221,19 @@ impl Tracer {
         ray: &Ray,
         u: [f64; 3],
     ) -> Option<Scattered> {
+        let scattered = self.sample_material(primitive, hit, ray, u)?;
+        let crosses = scattered.medium != ray.medium;
+        let keeps_side = hit.leads_to_side(scattered.direction, crosses);
+        keeps_side.then_some(scattered)
+    }
+
+    fn sample_material(
+        &self,
+        primitive: &WorldPrimitive,
+        hit: &Hit,
+        ray: &Ray,
+        u: [f64; 3],
+    ) -> Option<Scattered> {
         let same_side = Scattered {
             direction: ray.direction,
             weight: DVec3::ONE,
@@ -230,8 +243,8 @@ impl Tracer {
         };
         match self.world.materials[primitive.material] {
             Bsdf::Diffuse { reflectance } => {
-                let direction = diffuse::sample(hit.normal, [u[0], u[1]]);
-                let pdf = diffuse::pdf(hit.normal, direction);
+                let direction = diffuse::sample(hit.shading, [u[0], u[1]]);
+                let pdf = diffuse::pdf(hit.shading, direction);
                 (pdf > 0.0).then_some(Scattered {
                     direction,
                     weight: reflectance,
@@ -249,7 +262,7 @@ impl Tracer {
                     specular,
                     exponent,
                 };
-                let (direction, weight, pdf) = phong.sample(hit.normal, -ray.direction, u)?;
+                let (direction, weight, pdf) = phong.sample(hit.shading, -ray.direction, u)?;
                 Some(Scattered {
                     direction,
                     weight,
@@ -258,13 +271,14 @@ impl Tracer {
                 })
             }
             Bsdf::Mirror { reflectance } => Some(Scattered {
-                direction: mirror::reflect(ray.direction, hit.normal),
+                direction: mirror::reflect(ray.direction, hit.facing(ray.direction)),
                 weight: reflectance,
                 ..same_side
             }),
             Bsdf::Dielectric { ior, transmittance } => {
                 let Boundary { eta, beyond } = Boundary::new(primitive, ior, ray.medium);
-                let (direction, crossed) = dielectric::sample(ray.direction, hit.normal, eta, u[0]);
+                let normal = hit.facing(ray.direction);
+                let (direction, crossed) = dielectric::sample(ray.direction, normal, eta, u[0]);
                 if !crossed {
                     return Some(Scattered {
                         direction,

@@ -59,6 +59,35 @@ impl Value for Inside {
     }
 }
 
+/// The normals about which light is scattered.
+#[derive(Debug, Clone, Copy)]
+struct Normals {
+    smooth: bool,
+}
+
+const NORMALS: [(&str, Normals); 2] = [
+    ("cell", Normals { smooth: false }),
+    ("smooth", Normals { smooth: true }),
+];
+
+impl Value for Normals {
+    fn rule() -> String {
+        rule_of(NORMALS)
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        named(found, NORMALS)
+    }
+
+    fn schema() -> Json {
+        json!({"enum": NORMALS.map(|n| n.0)})
+    }
+
+    fn to_json(&self) -> Json {
+        json!(if self.smooth { "smooth" } else { "cell" })
+    }
+}
+
 impl Value for AxisOrder {
     fn rule() -> String {
         rule_of(ORDERS)
@@ -119,6 +148,11 @@ pub(super) fn read(t: &mut impl Table) -> Option<Shape> {
         Truth(true),
         "Whether it bounds a solid, closed where the volume ends. Otherwise it is a two-sided surface, open there.",
     );
+    let normals = t.defaulted(
+        "normals",
+        Normals { smooth: false },
+        "Whether light is scattered about the normals of the cells, or about smooth ones.",
+    );
     let file = file?.0;
     let volume = t.volume(&file, order?)?;
     let grid = Grid {
@@ -127,6 +161,7 @@ pub(super) fn read(t: &mut impl Table) -> Option<Shape> {
         order: order?,
         spacing: spacing?.0,
         above: inside?.above,
+        smooth: normals?.smooth,
     };
     if grid.extent().max_element() > LARGEST {
         let message = format!("the volume reaches over more than {LARGEST:e}");
@@ -169,9 +204,10 @@ pub(super) fn text(implicit: &Implicit, grid: &Grid, string: impl Fn(&str) -> St
     let rotation = rotation_text(implicit.rotation);
     let order = name_of(grid.order);
     format!(
-        "file = {}\norder = \"{order}\"\nlevel = {level}\ninside = \"{}\"\norigin = {origin}\nspacing = {spacing}\nrotation = {rotation}\nclosed = {}\n",
+        "file = {}\norder = \"{order}\"\nlevel = {level}\ninside = \"{}\"\norigin = {origin}\nspacing = {spacing}\nrotation = {rotation}\nclosed = {}\nnormals = \"{}\"\n",
         string(&grid.file),
         if grid.above { "above" } else { "below" },
-        implicit.closed
+        implicit.closed,
+        if grid.smooth { "smooth" } else { "cell" },
     )
 }

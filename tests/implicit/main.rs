@@ -5,6 +5,7 @@
 mod common;
 mod pictures;
 mod rays;
+mod smooth;
 mod volumes;
 
 /// Formulas with the text of their bounds, each for another reason: a quartic, a surface with cusps, one with many double points, a

@@ -107,6 +107,7 @@ fn all(count: usize) {
                     implicit = Implicit::of_volume(
                         Grid {
                             above: false,
+                            smooth: false,
                             ..grid
                         },
                         level,

@@ -1,7 +1,7 @@
 //! Isosurfaces of volumes as code, and what textures that code reads.
 
 use super::super::literal::{float, vector};
-use super::super::modules::IMPLICIT_GRID;
+use super::super::modules::{IMPLICIT_GRID, IMPLICIT_SMOOTH};
 use super::super::preprocess::fill;
 use super::implicit::{Sides, grids, name};
 use crate::files::npy::Numbers;
@@ -77,37 +77,39 @@ pub(super) fn surface(k: usize, number: usize, p: &WorldPrimitive, implicit: &Im
     let surface = Sides::of(number, p, implicit);
     let [x, y, z] = grid.volume.cells().map(|n| n - 1);
     let last = format!("vec3i({x}, {y}, {z})");
-    s += &fill(
-        IMPLICIT_GRID.text,
-        &[
-            ("name", &name),
-            ("height", &height),
-            ("center", &vector(implicit.center)),
-            ("row_x", &rows[0]),
-            ("row_y", &rows[1]),
-            ("row_z", &rows[2]),
-            ("column_x", &columns[0]),
-            ("column_y", &columns[1]),
-            ("column_z", &columns[2]),
-            ("normal_x", &normals[0]),
-            ("normal_y", &normals[1]),
-            ("normal_z", &normals[2]),
-            ("metric", &vector(metric)),
-            ("cells", &vector(cells)),
-            ("last", &last),
-            ("inside", &surface.inside),
-            ("asked", &surface.asked),
-            ("solid", surface.solid),
-            ("sign", surface.sign),
-            ("result", &surface.result),
-            ("key", &format!("{}u", key(number, 0))),
-            ("near", &float(slack)),
-            ("noise", &float(3.0 * slack + 4.0 * f64::from(f32::EPSILON))),
-            ("positive", if gain > 0.0 { "true" } else { "false" }),
-            ("below", &format!("{BELOW}u")),
-            ("newton", "2u"),
-            ("reach", &float(REACH)),
-        ],
-    );
+    let values: &[(&str, &str)] = &[
+        ("name", &name),
+        ("height", &height),
+        ("center", &vector(implicit.center)),
+        ("row_x", &rows[0]),
+        ("row_y", &rows[1]),
+        ("row_z", &rows[2]),
+        ("column_x", &columns[0]),
+        ("column_y", &columns[1]),
+        ("column_z", &columns[2]),
+        ("normal_x", &normals[0]),
+        ("normal_y", &normals[1]),
+        ("normal_z", &normals[2]),
+        ("metric", &vector(metric)),
+        ("cells", &vector(cells)),
+        ("last", &last),
+        ("inside", &surface.inside),
+        ("asked", &surface.asked),
+        ("solid", surface.solid),
+        ("sign", surface.sign),
+        ("result", &surface.result),
+        ("key", &format!("{}u", key(number, 0))),
+        ("near", &float(slack)),
+        ("noise", &float(3.0 * slack + 4.0 * f64::from(f32::EPSILON))),
+        ("positive", if gain > 0.0 { "true" } else { "false" }),
+        ("below", &format!("{BELOW}u")),
+        ("newton", "2u"),
+        ("reach", &float(REACH)),
+    ];
+    s += &fill(IMPLICIT_GRID.text, values);
+    if grid.smooth {
+        s.push('\n');
+        s += &fill(IMPLICIT_SMOOTH.text, values);
+    }
     s + "\n"
 }

@@ -92,7 +92,31 @@ pub(in crate::kernel) fn generate(world: &World, features: &Features) -> String 
             "    if key >> 2u == {number}u {{\n        v = {name}_vertex((key & 3u) == 1u, p, d);\n    }}"
         );
     }
-    s + "    return v;\n}\n\n"
+    s.push_str("    return v;\n}\n\n");
+    if features.has_smooth_normals {
+        s.push_str(&shading(world));
+    }
+    s
+}
+
+/// `implicit_shading`, which chooses among the surfaces with smooth normals.
+fn shading(world: &World) -> String {
+    let mut s = String::from(
+        "// The normal about which light is scattered at p, where the surface's own is n: on the same side.
+fn implicit_shading(key: u32, p: vec3f, n: vec3f) -> vec3f {
+    var shading = n;
+",
+    );
+    let smooth = grids(world).filter(|s| s.2.grid().is_some_and(|g| g.smooth));
+    for (number, ..) in smooth {
+        let _ = writeln!(
+            s,
+            "    if key == {}u {{\n        shading = {}_smooth(p, n);\n    }}",
+            key(number, 0),
+            name(number)
+        );
+    }
+    s + "    return shading;\n}\n\n"
 }
 
 /// Formula number `k`, in both arithmetics.

@@ -5,14 +5,20 @@ use super::super::features::Features;
 use crate::scene::MaterialKind;
 use std::fmt::Write as _;
 
-/// `sample_bsdf`, and `evaluate_bsdf` if it is called.
+/// `sample_bsdf`, and `evaluate_bsdf` if it is called. With smooth normals they are `sample_material` and `evaluate_material`, which
+/// `shaders/bsdf/smooth.wgsl` calls.
 pub(in crate::kernel) fn dispatch(features: &Features) -> String {
     let mut s = String::new();
+    let what = if features.has_smooth_normals {
+        "material"
+    } else {
+        "bsdf"
+    };
     let all: Vec<MaterialKind> = features.materials().collect();
     s.push_str(&over(
         features,
         "sample",
-        "fn sample_bsdf(x: ptr<function, Interaction>, u: Draws) -> Scattered",
+        &format!("fn sample_{what}(x: ptr<function, Interaction>, u: Draws) -> Scattered"),
         "(x, u)",
         "Scattered",
         &all,
@@ -22,7 +28,7 @@ pub(in crate::kernel) fn dispatch(features: &Features) -> String {
         s.push_str(&over(
             features,
             "evaluate",
-            "fn evaluate_bsdf(x: ptr<function, Interaction>, wi: vec3f) -> BsdfValue",
+            &format!("fn evaluate_{what}(x: ptr<function, Interaction>, wi: vec3f) -> BsdfValue"),
             "(x, wi)",
             "BsdfValue",
             &scattering,

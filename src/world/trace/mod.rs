@@ -70,10 +70,31 @@ pub struct Hit {
     pub point: DVec3,
     /// Unit normal, on the side that the ray comes from.
     pub normal: DVec3,
+    /// Unit normal about which light is scattered, on the same side. It is [`normal`](Self::normal), but where a volume has smooth ones.
+    pub shading: DVec3,
     /// Identity of the face that was met.
     pub face: u32,
     /// What was met.
     pub met: Met,
+}
+
+impl Hit {
+    /// The normal about which a mirror or glass scatters what comes in `direction`: the one of the two shading normals that faces it. A smooth
+    /// normal may turn away from a ray that meets the surface's front.
+    pub fn facing(&self, direction: DVec3) -> DVec3 {
+        if self.shading.dot(direction) > 0.0 {
+            -self.shading
+        } else {
+            self.shading
+        }
+    }
+
+    /// Whether `direction` leads to the side of the surface that it should: to that of the ray, or beyond if it crosses. About a smooth
+    /// normal light may be scattered to the wrong side, where it is lost.
+    pub fn leads_to_side(&self, direction: DVec3, crosses: bool) -> bool {
+        // About the surface's own normal nothing is: what rounding does at grazing angles is no reason to lose light.
+        self.shading == self.normal || (self.normal.dot(direction) < 0.0) == crosses
+    }
 }
 
 /// The nearest surface so far, by its number among lights and primitives.
@@ -106,10 +127,12 @@ impl World {
                 let met = disk::intersect(l.center, l.normal, l.offset, l.radius, l.face, ray);
                 met.filter(|&t| is_first(t)).map(|t| {
                     let front = l.normal.dot(ray.direction) < 0.0;
+                    let normal = if front { l.normal } else { -l.normal };
                     Hit {
                         t,
                         point: plane::project(l.normal, l.offset, ray.at(t)),
-                        normal: if front { l.normal } else { -l.normal },
+                        normal,
+                        shading: normal,
                         face: l.face,
                         met: Met::Light {
                             index: number,
@@ -126,10 +149,18 @@ impl World {
                 } else {
                     inside
                 };
+                let side = if turn { -1.0 } else { 1.0 };
+                let shading = match &p.geometry {
+                    Geometry::Implicit(implicit) => {
+                        implicit.shading_normal(point, outward, face == 1)
+                    }
+                    _ => outward,
+                };
                 Some(Hit {
                     t,
                     point,
-                    normal: if turn { -outward } else { outward },
+                    normal: outward * side,
+                    shading: shading * side,
                     face: p.faces[face],
                     met: Met::Primitive(number - self.lights.len()),
                 })
@@ -151,24 +182,28 @@ impl World {
     }
 
     /// The ray that leaves `hit`, where `ray` has met a mirror or glass. At glass it refracts if it can, or is reflected if
-    /// `reflects`. `None` from other surfaces.
+    /// `reflects`. `None` from other surfaces, and where a smooth normal leads to the wrong side.
     pub fn specular(&self, hit: &Hit, ray: &Ray, reflects: bool) -> Option<Ray> {
         let Met::Primitive(index) = hit.met else {
             return None;
         };
         let p = &self.primitives[index];
+        let normal = hit.facing(ray.direction);
         let (direction, medium) = match self.materials[p.material] {
-            Bsdf::Mirror { .. } => (mirror::reflect(ray.direction, hit.normal), ray.medium),
+            Bsdf::Mirror { .. } => (mirror::reflect(ray.direction, normal), ray.medium),
             Bsdf::Dielectric { ior, .. } => {
                 let boundary = Boundary::new(p, ior, ray.medium);
                 let u = if reflects { 1.0 } else { 0.0 };
                 let (direction, crossed) =
-                    dielectric::sample(ray.direction, hit.normal, boundary.eta, u);
+                    dielectric::sample(ray.direction, normal, boundary.eta, u);
                 let medium = if crossed { boundary.beyond } else { ray.medium };
                 (direction, medium)
             }
             _ => return None,
         };
+        if !hit.leads_to_side(direction, medium != ray.medium) {
+            return None;
+        }
         Some(Ray {
             origin: hit.point,
             direction,
