@@ -372,8 +372,8 @@ fn the_schema_is_complete_for_editors() {
     let mut defaults = 0;
     walk(&schema, &mut defaults);
     // up; max_depth, strata, seed; the mirror's reflectance; ior, transmittance; level, center, scale, rotation, closed of a formula;
-    // order, inside, rotation, closed of a volume.
-    assert_eq!(defaults, 16);
+    // order, inside, rotation, closed, normals of a volume.
+    assert_eq!(defaults, 17);
     assert_eq!(
         schema["$schema"],
         json!("http://json-schema.org/draft-07/schema#")

@@ -3,13 +3,14 @@
 
 use crate::common::{block_means, cpu, film, settings, worst_t};
 use etendue::gpu::{Choice, Gpu, GpuEngine};
-use etendue::kernel::{Kernel, compose};
+use etendue::kernel::{Access, Kernel, compose};
 use etendue::reference::Estimator;
 use etendue::settings::{LightParts, Settings};
 use etendue::world::World;
 use etendue::world::trace::Ray;
 use etendue::{Grid, Implicit, Numbers, Scene, SceneBuilder, Volume};
 use glam::DVec3;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -263,4 +264,39 @@ fn faults_are_seen() {
         }
     }
     assert!(unseen.is_empty(), "{unseen:?}");
+}
+
+/// Every way to reach a surface has a kernel with smooth normals that is valid, and other scenes have nothing of it.
+#[test]
+fn kernels_have_smooth_normals_where_a_surface_has() {
+    for access in [Access::Baked, Access::Buffers, Access::Tree] {
+        for smooth in [false, true] {
+            let room = Scene::builder()
+                .camera([0.0, 0.0, 9.0], [0.0; 3], 40.0, SIZE)
+                .diffuse("white", [0.5; 3])
+                .phong("phong", [0.2, 0.3, 0.3], [0.4, 0.3, 0.2], 20.0)
+                .dielectric("glass", 1.5)
+                .isosurface(&ball(4, DVec3::ZERO, smooth), "white")
+                .isosurface(&ball(4, DVec3::X * 3.0, false), "glass")
+                .sphere([0.0, 3.0, 0.0], 0.5, "phong")
+                .light([0.0, 9.0, 0.0], [0.0, -1.0, 0.0], 1.0, [1.0; 3])
+                .build()
+                .unwrap_or_else(|e| panic!("{e}"));
+            let kernel = compose(
+                &World::new(&room, SIZE),
+                &of_room(&room, false, 0),
+                Some(access),
+            );
+            let light = kernel.light.expect("light paths").wgsl;
+            for text in [kernel.wgsl, light] {
+                let module = naga::front::wgsl::parse_str(&text)
+                    .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+                Validator::new(ValidationFlags::all(), Capabilities::default())
+                    .validate(&module)
+                    .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+                assert_eq!(text.contains("geometric"), smooth, "{access:?}");
+                assert_eq!(text.matches("_smooth(p").count(), usize::from(smooth));
+            }
+        }
+    }
 }

@@ -85,6 +85,7 @@ fn keys_that_are_wrong() {
         ("order = 'zxy'", "order must be \"zyx\" or \"xyz\""),
         ("inside = 'up'", "inside must be \"above\" or \"below\""),
         ("closed = 1", "closed must be true or false"),
+        ("normals = 'flat'", "normals must be \"cell\" or \"smooth\""),
         ("scale = 2", "unknown key \"scale\" in [[isosurface]]"),
     ] {
         one(&good, &with_key(key), message);
@@ -143,6 +144,7 @@ fn the_hash_covers_the_numbers_and_not_the_name() {
         hash(&bytes, "a.npy", "level = 3\ninside = 'below'"),
         hash(&bytes, "a.npy", "level = 3\norder = 'xyz'"),
         hash(&bytes, "a.npy", "level = 3\nclosed = false"),
+        hash(&bytes, "a.npy", "level = 3\nnormals = 'smooth'"),
     ];
     for (i, one) in changed.iter().enumerate() {
         assert!(*one != first && !changed[..i].contains(one), "{i}");
