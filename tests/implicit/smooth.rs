@@ -295,7 +295,7 @@ fn kernels_have_smooth_normals_where_a_surface_has() {
                     .validate(&module)
                     .unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
                 assert_eq!(text.contains("geometric"), smooth, "{access:?}");
-                assert_eq!(text.matches("_smooth(p").count(), usize::from(smooth));
+                assert_eq!(text.matches("_smooth(p, n)").count(), usize::from(smooth));
             }
         }
     }
