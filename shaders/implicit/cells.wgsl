@@ -72,18 +72,21 @@ struct Bracket {
     u: f32,
 }
 
-// A step of Newton's method, or of bisection where that leads out.
+// A step to the root of the parabola with the cubic's value, slope and bend at u, or of bisection where that leads out. A step of Newton's
+// method would only halve the distance to a root that is nearly double.
 fn narrower(b: Bracket, first: f32, c: vec3f) -> Bracket {
     let value = first + b.u * (c.x + b.u * (c.y + b.u * c.z));
     let slope = c.x + b.u * (2.0 * c.y + b.u * (3.0 * c.z));
+    let bend = c.y + b.u * (3.0 * c.z);
     let low = select(b.low, b.u, value > 0.0);
     let high = select(b.u, b.high, value > 0.0);
-    let guess = b.u - value / select(slope, -TINY, abs(slope) < TINY);
+    let steep = fmax(-slope, 0.0) + sqrt(fmax(slope * slope - 4.0 * bend * value, 0.0));
+    let guess = b.u + 2.0 * value / fmax(steep, TINY);
     return Bracket(low, high, select(0.5 * (low + high), guess, guess >= low && guess <= high));
 }
 
 // The first root of a cubic that is above 0 at 0; 2 if there is none up to 1. Between the places at which it is level it falls or rises
-// all the way, so a root is never passed over [Marmitt2004].
+// all the way, so a root is never passed over [Marmitt2004]. Three steps leave nothing but rounding.
 fn first_root(b: vec4f) -> f32 {
     let d = b.yzw - b.xyz;
     let bend = d.y - d.x;
@@ -93,15 +96,30 @@ fn first_root(b: vec4f) -> f32 {
     let v = vec2f(b.x) + level * (vec2f(c.x) + level * (vec2f(c.y) + level * c.z));
     let in_first = v.x <= 0.0;
     let in_second = !in_first && v.y <= 0.0;
-    let low = select(select(level.y, level.x, in_second), 0.0, in_first);
-    let high = select(select(1.0, level.y, in_second), level.x, in_first);
-    let above = select(select(v.y, v.x, in_second), b.x, in_first);
-    let below = select(select(b.w, v.y, in_second), v.x, in_first);
+    var low = select(select(level.y, level.x, in_second), 0.0, in_first);
+    var high = select(select(1.0, level.y, in_second), level.x, in_first);
+    var above = select(select(v.y, v.x, in_second), b.x, in_first);
+    var below = select(select(b.w, v.y, in_second), v.x, in_first);
+
+    // The side of the inflection on which the root lies.
+    let turn = clamp(-bend / select(twist, TINY, abs(twist) < TINY), low, high);
+    let there = b.x + turn * (c.x + turn * (c.y + turn * c.z));
+    let after = there > 0.0;
+    low = select(low, turn, after);
+    above = select(above, there, after);
+    high = select(turn, high, after);
+    below = select(there, below, after);
+
+    // Where the cubic is less steep at the inflection than anywhere else, each of its three terms from there on falls, so the root comes
+    // before any one of them makes up for the value, and not before half of that. Elsewhere a chord is a good guess. A triple root is
+    // found from the first one only.
+    let lost = abs(there);
+    let slope = c.x + turn * (2.0 * c.y + turn * (3.0 * c.z));
+    let by_bend = sqrt(lost / fmax(abs(c.y + 3.0 * turn * c.z), TINY));
+    let reach = fmin(fmin(lost / fmax(-slope, TINY), by_bend), pow(lost / fmax(-twist, TINY), 1.0 / 3.0));
+    let near = clamp(turn + select(-reach, reach, after), low, high);
     let chord = low + (high - low) * clamp(above / fmax(above - below, TINY), 0.0, 1.0);
-    var part = Bracket(low, high, chord);
-    part = narrower(part, b.x, c);
-    part = narrower(part, b.x, c);
-    part = narrower(part, b.x, c);
+    var part = Bracket(low, high, select(chord, near, twist < 0.0));
     part = narrower(part, b.x, c);
     part = narrower(part, b.x, c);
     part = narrower(part, b.x, c);

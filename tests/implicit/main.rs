@@ -3,6 +3,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod cubics;
 mod pictures;
 mod rays;
 mod volumes;

@@ -11,7 +11,7 @@ use etendue::world::{Geometry, World, WorldPrimitive};
 use glam::DVec3;
 use std::sync::LazyLock;
 
-static GPU: LazyLock<Gpu> =
+pub static GPU: LazyLock<Gpu> =
     LazyLock::new(|| Gpu::open(&Choice::default()).unwrap_or_else(|e| panic!("{e}")));
 
 const BODY: &str = "
@@ -163,7 +163,7 @@ fn answers(world: &World, count: usize, seed: u64) -> (Vec<Values>, Vec<Values>)
     (inputs, outputs)
 }
 
-fn settings_of(world: &World) -> etendue::Settings {
+pub fn settings_of(world: &World) -> etendue::Settings {
     let _ = world;
     let any = scene(&scene_of(
         "x",
