@@ -6,8 +6,9 @@ struct CellStep {
     cell: vec3i,
 }
 
-// The ray q + t w leaves the aligned cube of cells around `cell` with the side 2^bits. It was in the cell at `since`.
-fn beyond_cube(q: vec3f, w: vec3f, inverse: vec3f, cell: vec3i, bits: u32, since: f32) -> CellStep {
+// The ray q + t w leaves the aligned cube of cells around `cell` with the side 2^bits. It was in the cell at `since`. The cube may reach
+// beyond the `last` cell.
+fn beyond_cube(q: vec3f, w: vec3f, inverse: vec3f, cell: vec3i, bits: u32, since: f32, last: vec3i) -> CellStep {
     let side = vec3i(1i << bits);
     let low = (cell >> vec3u(bits)) << vec3u(bits);
     let forward = inverse > vec3f(0.0);
@@ -15,8 +16,8 @@ fn beyond_cube(q: vec3f, w: vec3f, inverse: vec3f, cell: vec3i, bits: u32, since
     let x = ends.x <= ends.y && ends.x <= ends.z;
     let y = !x && ends.y <= ends.z;
     let t = fmax(fmin(ends.x, fmin(ends.y, ends.z)), since);
-    // Along the other axes it is still beside the cube, whatever rounding says.
-    let beside = clamp(vec3i(floor(q + t * w)), low, low + side - vec3i(1));
+    // Along the other axes it is still beside the cube, and in the volume, whatever rounding says: a ray may run in its last face.
+    let beside = clamp(vec3i(floor(q + t * w)), low, min(low + side - vec3i(1), last));
     let next = select(low - vec3i(1), low + side, forward);
     return CellStep(t, select(beside, next, vec3<bool>(x, y, !x && !y)));
 }

@@ -67,7 +67,7 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         var free = cube > 0u && (cube < $below) == over;
         while goes && free && trips_left > 0u {
             trips_left -= 1u;
-            let next = beyond_cube(q, w, inverse, cell, (cube & ($below - 1u)) - 1u, a);
+            let next = beyond_cube(q, w, inverse, cell, (cube & ($below - 1u)) - 1u, a, $last);
             a = next.t;
             cell = next.cell;
             clear = true;
@@ -77,7 +77,7 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         }
 
         // A cell with a root, perhaps.
-        let next = beyond_cube(q, w, inverse, cell, 0u, a);
+        let next = beyond_cube(q, w, inverse, cell, 0u, a, $last);
         let b = fmin(next.t, end);
         let corner = vec3f(cell);
         let enter = clamp(q + a * w - corner, vec3f(0.0), vec3f(1.0));

@@ -55,7 +55,10 @@ fn volumes() -> Vec<(&'static str, Implicit)> {
             40 * (i % 7) as u16
         }
     });
+    // A shell of less than a cell.
+    let shell = |p: DVec3| 0.03 - (p.length() - 0.7).abs();
     vec![
+        ("shell", of([32; 3], floats(sampled([32; 3], shell)), 0.0)),
         ("ball", of([24; 3], floats(sampled([24; 3], ball)), 0.0)),
         (
             "blobs",
