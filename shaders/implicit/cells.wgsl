@@ -128,7 +128,7 @@ fn first_root(b: vec4f) -> f32 {
 }
 
 // The same of a cubic whose value at 0 is a root but for rounding: that one is divided out. Where it falls at once it has its root at 0.
-// What it falls by counts from `noise` on.
+// What it falls by counts from `noise` on; so a ray that dips below 0 at once by less, and rises again, meets the next root.
 fn root_after_start(b: vec4f, noise: f32) -> f32 {
     let e = b.yzw - vec3f(b.x);
     // The quotient, a quadratic in Bernstein's form.
@@ -140,10 +140,12 @@ fn root_after_start(b: vec4f, noise: f32) -> f32 {
     let next = select(select(2.0, r.y, r.y > 0.0), r.x, r.x > 0.0);
     let first = select(2.0, next, some);
     let second = select(2.0, r.y, some && r.x > 0.0);
+    // Where the quotient is below 0: two parts at most.
     let falls = q.x <= 0.0;
-    let begin = select(first, 0.0, falls);
-    let end = fmin(select(second, first, falls), 1.0);
+    let begin = vec2f(select(first, 0.0, falls), select(2.0, second, falls));
+    let end = vec2f(fmin(select(second, first, falls), 1.0), 1.0);
     let middle = 0.5 * (begin + end);
-    let depth = -middle * (q.x + middle * (2.0 * h + middle * k));
-    return select(2.0, begin, begin < 1.0 && depth > noise);
+    let depth = -middle * (vec2f(q.x) + middle * (vec2f(2.0 * h) + middle * k));
+    let deep = (begin < vec2f(1.0)) & (depth > vec2f(noise));
+    return select(select(2.0, begin.y, deep.y), begin.x, deep.x);
 }

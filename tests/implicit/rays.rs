@@ -362,13 +362,16 @@ fn near_edge(implicit: &Implicit, p: DVec3) -> bool {
     const NEAR: f64 = 1e-4;
     let q = implicit.to_local(p);
     let reach = NEAR * implicit.clip.radius();
-    let normal = |q: DVec3| implicit.sloped(q).1.normalize_or_zero();
     // The cells around a point, across faces, edges and corners.
-    let mut around = (0..27).map(|k| {
-        let side = DVec3::from_array([k % 3, k / 3 % 3, k / 9].map(|n| f64::from(n) - 1.0));
-        side * reach
-    });
-    implicit.clip.depth(q).abs() < reach || around.any(|d| normal(q + d).dot(normal(q)) < 0.98)
+    let around: Vec<DVec3> = (0..27)
+        .map(|k| {
+            let side = DVec3::from_array([k % 3, k / 3 % 3, k / 9].map(|n| f64::from(n) - 1.0));
+            let (_, gradient) = implicit.sloped(q + side * reach);
+            gradient.normalize_or_zero()
+        })
+        .collect();
+    let differs = |a: &DVec3| around.iter().any(|b| a.dot(*b) < 0.98);
+    implicit.clip.depth(q).abs() < reach || around.iter().any(differs)
 }
 
 /// What is wrong with the answers to `count` rays.
