@@ -258,7 +258,198 @@ fn apply(damage: &[Damage], bytes: &mut Vec<u8>) {
     }
 }
 
+/// A scene with strings wherever one may stand: `{k}` are filled in.
+const STRINGS: &str = "title = {0}\n\
+    [camera]\neye = [0, 1, 4]\nlook_at = [0, 1, 0]\nvfov = 40\nresolution = [8, 8]\n[render]\n{1} = 3\n\
+    [material.{2}]\ntype = {3}\nreflectance = [0.5, 0.5, 0.5]\n\
+    [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = {4}\n\
+    [[spheres]]\nfile = {5}\nradius = 1\nmaterial = {2}\n\
+    [[implicit]]\nf = {6}\nbounds = { radius = 1 }\nmaterial = {2}\nparameters = { {7} = 1 }\n\
+    [[isosurface]]\nfile = {8}\nlevel = 1\norigin = [0, 0, 0]\nspacing = [1, 1, 1]\norder = {9}\nmaterial = {2}\n\
+    [[light]]\ncenter = [0, 9, 0]\nnormal = [0, -1, 0]\nradius = 1\nradiance = [1, 1, 1]\n";
+
+/// What is put in where nothing is wrong.
+const RIGHT: [&str; 10] = [
+    "t", "seed", "white", "diffuse", "white", "rows.csv", "x", "a", "d.npy", "zyx",
+];
+
+/// A TOML string of any text, by escapes.
+fn escaped(text: &str) -> String {
+    let all = text.chars().map(|c| format!("\\U{:08x}", u32::from(c)));
+    format!("\"{}\"", all.collect::<String>())
+}
+
+fn with_strings(strings: &[String]) -> String {
+    let mut text = STRINGS.to_owned();
+    for (k, s) in strings.iter().enumerate() {
+        text = text.replace(&format!("{{{k}}}"), &escaped(s));
+    }
+    text
+}
+
+/// A `.npy` file.
+#[derive(Debug, Clone)]
+struct NumbersFile {
+    kind: &'static str,
+    fortran: bool,
+    version: u8,
+    shape: [usize; 3],
+    values: Vec<f64>,
+}
+
+impl NumbersFile {
+    fn bytes(&self) -> Vec<u8> {
+        let [a, b, c] = self.shape;
+        let order = if self.fortran { "True" } else { "False" };
+        let dict = format!(
+            "{{'descr': '{}', 'fortran_order': {order}, 'shape': ({a}, {b}, {c}), }}\n",
+            self.kind
+        );
+        let mut bytes = vec![0x93];
+        bytes.extend(b"NUMPY");
+        bytes.extend([self.version, 0]);
+        match self.version {
+            1 => bytes.extend((dict.len() as u16).to_le_bytes()),
+            _ => bytes.extend((dict.len() as u32).to_le_bytes()),
+        }
+        bytes.extend(dict.bytes());
+        for x in &self.values {
+            let mut one = match &self.kind[1..] {
+                "u1" => vec![*x as u8],
+                "u2" => (*x as u16).to_le_bytes().to_vec(),
+                "f4" => (*x as f32).to_le_bytes().to_vec(),
+                _ => x.to_le_bytes().to_vec(),
+            };
+            if self.kind.starts_with('>') {
+                one.reverse();
+            }
+            bytes.extend(one);
+        }
+        bytes
+    }
+
+    /// The number at three indices.
+    fn at(&self, [i, j, k]: [usize; 3]) -> f64 {
+        let [a, b, c] = self.shape;
+        self.values[if self.fortran {
+            i + a * (j + b * k)
+        } else {
+            k + c * (j + b * i)
+        }]
+    }
+
+    /// What a scene of it says. The folder is there as long as the scene is read.
+    fn scene(bytes: &[u8], order: &str) -> Result<Scene, Vec<String>> {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        std::fs::write(folder.path().join("d.npy"), bytes).expect("written");
+        std::fs::write(folder.path().join("rows.csv"), "x,y,z\n1,2,3\n").expect("written");
+        let mut strings = RIGHT.map(str::to_owned);
+        strings[9] = order.to_owned();
+        let scene = parse_str(&folder.path().join("x.toml"), &with_strings(&strings));
+        let lines =
+            |all: Vec<etendue::scene::Diagnostic>| all.iter().map(|d| d.to_string()).collect();
+        scene.map_err(lines)
+    }
+}
+
+fn numbers_file(wild: bool) -> impl Strategy<Value = NumbersFile> {
+    let kinds = vec!["|u1", "<u2", ">u2", "<f4", ">f4", "<f8", ">f8"];
+    let side = || 2..6usize;
+    let kinds = prop::sample::select(kinds);
+    (kinds, any::<bool>(), 1..=3u8, [side(), side(), side()]).prop_flat_map(
+        move |(kind, fortran, version, shape)| {
+            let value = match &kind[1..] {
+                "u1" => (0..=255u16).prop_map(f64::from).boxed(),
+                "u2" => any::<u16>().prop_map(f64::from).boxed(),
+                _ if wild => any::<f32>().prop_map(f64::from).boxed(),
+                _ => (-1e6f32..1e6).prop_map(f64::from).boxed(),
+            };
+            vec(value, shape.iter().product::<usize>()).prop_map(move |values| NumbersFile {
+                kind,
+                fortran,
+                version,
+                shape,
+                values,
+            })
+        },
+    )
+}
+
 proptest! {
+    #[test]
+    fn volumes_are_read_as_numpy_would(file in numbers_file(false)) {
+        for order in ["zyx", "xyz"] {
+            let scene = NumbersFile::scene(&file.bytes(), order);
+            let scene = scene.map_err(|e| TestCaseError::fail(e.join("\n")))?;
+            let surface = scene.primitives.iter().rev().find_map(|p| match &p.shape {
+                Shape::Implicit(i) => i.grid(),
+                _ => None,
+            });
+            let volume = &surface.expect("a volume").volume;
+            let [a, b, c] = file.shape;
+            prop_assert_eq!(volume.size(), if order == "xyz" { [a, b, c] } else { [c, b, a] });
+            for (i, j, k) in (0..a).flat_map(|i| (0..b).flat_map(move |j| (0..c).map(move |k| (i, j, k)))) {
+                let at = if order == "xyz" { [i, j, k] } else { [k, j, i] };
+                prop_assert_eq!(volume.at(at), file.at([i, j, k]));
+            }
+        }
+    }
+
+    #[test]
+    fn damaged_volumes_never_panic(
+        file in numbers_file(true),
+        damages in vec(damage(), 0..4),
+        end in prop::option::of(0..1000usize),
+        shape in prop::option::of((0..5u64, any::<u64>(), any::<u64>())),
+    ) {
+        let mut bytes = file.bytes();
+        if let Some(shape) = shape {
+            // A header that promises something else.
+            let [a, b, c] = file.shape;
+            let old = format!("({a}, {b}, {c})");
+            let at = bytes.windows(old.len()).position(|w| w == old.as_bytes()).expect("the shape");
+            let new = format!("{shape:?}");
+            bytes.splice(at..at + old.len(), new.bytes());
+            let length = if file.version == 1 { 2 } else { 4 };
+            let start = 8 + length;
+            let dict = bytes[start..].iter().position(|b| *b == b'\n').expect("its end") + 1;
+            let size = (dict as u32).to_le_bytes();
+            bytes.splice(8..start, size[..length].iter().copied());
+        }
+        apply(&damages, &mut bytes);
+        if let Some(end) = end {
+            bytes.truncate(end);
+        }
+        match NumbersFile::scene(&bytes, "zyx") {
+            Ok(scene) => drop(lint(&scene)),
+            Err(messages) => {
+                prop_assert!(!messages.is_empty());
+                for message in messages {
+                    prop_assert!(message.contains("d.npy"), "{}", message);
+                    prop_assert!(!message.contains(char::is_control), "{:?}", message);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_message_is_one_line(
+        strings in vec(prop_oneof![3 => "[\\PC\\x00-\\x1f\\x7f-\\x9f\\u{2028}\\u{2029}/]{0,30}", 1 => ".{0,60}"], 10),
+        right in vec(any::<bool>(), 10),
+        path in "[a-z\\x00-\\x1f]{1,9}",
+    ) {
+        let all = strings.iter().zip(RIGHT).zip(right);
+        let all: Vec<String> = all.map(|((s, r), right)| if right { r.to_owned() } else { s.clone() }).collect();
+        let said: Vec<String> = match parse_str(Path::new(&path), &with_strings(&all)) {
+            Ok(scene) => lint(&scene).iter().map(ToString::to_string).collect(),
+            Err(errors) => errors.iter().map(ToString::to_string).collect(),
+        };
+        for message in said {
+            let ends = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+            prop_assert!(!message.contains(ends), "{:?}", message);
+        }
+    }
+
     #[test]
     fn valid_scenes_are_read_as_written(scene in scenes(true)) {
         let text = to_toml(&scene).expect("strings take all text");

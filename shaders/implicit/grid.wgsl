@@ -67,7 +67,7 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         var free = cube > 0u && (cube < $below) == over;
         while goes && free && trips_left > 0u {
             trips_left -= 1u;
-            let next = beyond_cube(q, w, inverse, cell, (cube & ($below - 1u)) - 1u, a);
+            let next = beyond_cube(q, w, inverse, cell, (cube & ($below - 1u)) - 1u, a, $last);
             a = next.t;
             cell = next.cell;
             clear = true;
@@ -77,7 +77,7 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         }
 
         // A cell with a root, perhaps.
-        let next = beyond_cube(q, w, inverse, cell, 0u, a);
+        let next = beyond_cube(q, w, inverse, cell, 0u, a, $last);
         let b = fmin(next.t, end);
         let corner = vec3f(cell);
         let enter = clamp(q + a * w - corner, vec3f(0.0), vec3f(1.0));
@@ -85,7 +85,9 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         let values = $name_cell(cell);
         let cubic = sign * cell_cubic(values, enter, leave);
         let blur = $noise * largest_of(values);
-        let u = select(root_after_start(cubic, blur), select(first_root(cubic), 0.0, cubic.x <= 0.0), clear);
+        // By the end of the cell before it has fallen by more than roundings.
+        let fallen = cubic.x <= select(-blur, 0.0, clear) && (clear || a > 0.0);
+        let u = select(select(root_after_start(cubic, blur), first_root(cubic), clear), 0.0, fallen);
         met = goes && u <= 1.0;
         t = select(t, a + u * (b - a), met);
         clear = clear || cubic.w > blur;

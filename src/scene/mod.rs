@@ -32,6 +32,7 @@ pub use value::{LARGEST_RESOLUTION, LARGEST_STRATA};
 
 use crate::implicit::Implicit;
 use glam::DVec3;
+use source::one_line;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -227,14 +228,14 @@ pub struct Diagnostic {
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.path.display())?;
+        write!(f, "{}", one_line(&self.path.display().to_string()))?;
         if self.line > 0 {
             write!(f, ":{}", self.line)?;
         }
         if self.line > 0 && self.column > 0 {
             write!(f, ":{}", self.column)?;
         }
-        write!(f, ": {}", self.message)
+        write!(f, ": {}", one_line(&self.message))
     }
 }
 

@@ -4,7 +4,7 @@
 use super::format::{self, ShapeKind, Table};
 use super::reader::Reader;
 use super::rows::{Palette, RowKind};
-use super::source::{Faults, Source, quoted, suggestion};
+use super::source::{Faults, Source, one_line, quoted, suggestion};
 use super::value::Text;
 use super::{
     Bsdf, Diagnostic, Light, Material, Place, Primitive, RenderHints, RowFile, Scene, Shape,
@@ -32,7 +32,7 @@ pub const MAX_VOLUMES: usize = 8;
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file is missing, a directory, or can't be read.
-    #[error("{}: cannot read: {}", path.display(), reason(source))]
+    #[error("{}: cannot read: {}", one_line(&path.display().to_string()), reason(source))]
     Io {
         /// The file.
         path: PathBuf,

@@ -128,21 +128,25 @@ impl<'a> Source<'a> {
     }
 }
 
-/// `text` without control characters, cut at [`MAX_QUOTE`] characters.
-pub(super) fn shorten(text: &str) -> String {
-    let mut short = String::new();
-    for (i, c) in text.chars().enumerate() {
-        if i == MAX_QUOTE {
-            short.push('…');
-            break;
-        }
-        if c.is_control() {
-            short.extend(c.escape_default());
+/// `text` with escapes in place of what ends a line, or does something to a terminal. All that a file says may hold such characters: keys,
+/// names of files, headers of arrays.
+pub(super) fn one_line(text: &str) -> String {
+    let mut line = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() || matches!(c, '\u{2028}' | '\u{2029}') {
+            line.extend(c.escape_default());
         } else {
-            short.push(c);
+            line.push(c);
         }
     }
-    short
+    line
+}
+
+/// `text` on one line, cut at [`MAX_QUOTE`] characters.
+pub(super) fn shorten(text: &str) -> String {
+    let mut rest = text.chars();
+    let short: String = rest.by_ref().take(MAX_QUOTE).collect();
+    one_line(&short) + if rest.next().is_some() { "…" } else { "" }
 }
 
 /// `name` in double quotes, shortened.

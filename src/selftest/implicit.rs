@@ -1,11 +1,12 @@
-//! Implicit surfaces whose answers are known: a thin shell is two spheres, and what loses no energy is invisible in the white dome.
+//! Implicit surfaces whose answers are known: a thin shell is two spheres, a saddle is trilinear, and what loses no energy is invisible in the white dome.
 
 use super::Case;
 use super::backend::{Backend, Trouble};
 use super::build::{Build, GLASS, MIRROR, grey, sphere, v};
 use super::measure::{Measure, Tolerance};
 use super::rays::{Dice, Landing, Range, Shot};
-use crate::implicit::Implicit;
+use crate::files::npy::Numbers;
+use crate::implicit::{Grid, Implicit, Volume};
 use crate::scene::{Bsdf, Shape};
 use glam::DVec3;
 use std::sync::Arc;
@@ -22,6 +23,12 @@ pub const CASES: &[Case] = &[
         name: "formulas_in_dome",
         what: "a white torus, a mirror ellipsoid and a glass torus, by their formulas, in the white dome: rays that leave surfaces",
         run: in_dome,
+    },
+    Case {
+        row: "I3",
+        name: "saddle_in_a_volume",
+        what: "rays at and inside a solid below z = x y, from a volume whose function is that exactly: cells, caps, two roots on a line",
+        run: saddle,
     },
 ];
 
@@ -116,6 +123,161 @@ fn thin_shell(b: &Backend) -> Result<Vec<Measure>, Trouble> {
                 let off = |t: f64| (landing.t - t).abs() > 1e-5 + 3e-6 / cosine;
                 landing.surface != Some(number) || expected.is_none_or(off)
             })
+            .count();
+        measures.push(Measure::none(
+            format!(
+                "{name}, from one side to the other: wrong of {}",
+                through.len()
+            ),
+            mistakes,
+        ));
+    }
+    Ok(measures)
+}
+
+/// The solid of z < x y in the cube from -1 to 1. The function is trilinear, so that of the cells is the same, and its numbers are exact.
+fn saddle_volume() -> Shape {
+    let size = [33, 17, 9];
+    let along = |k: usize, n: usize| 2.0 * k as f64 / (n - 1) as f64 - 1.0;
+    let mut all = Vec::new();
+    for z in 0..size[2] {
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let [x, y, z] = [(x, 0), (y, 1), (z, 2)].map(|(k, axis)| along(k, size[axis]));
+                all.push((x * y - z) as f32);
+            }
+        }
+    }
+    let volume = Volume::new(size, Numbers::F32(all)).unwrap_or_else(|e| panic!("{e}"));
+    let spacing = v(2.0 / 32.0, 2.0 / 16.0, 2.0 / 8.0);
+    let mut implicit = Implicit::of_volume(Grid::new(volume, spacing), 0.0);
+    implicit.center = DVec3::splat(-1.0);
+    Shape::Implicit(Arc::new(implicit))
+}
+
+/// A line and the saddle.
+struct OnLine {
+    /// Where the line is in the cube.
+    span: [f64; 2],
+    /// x y - z along it: c0 + c1 t + c2 t².
+    c: [f64; 3],
+}
+
+impl OnLine {
+    /// None if it is not in the cube, or hardly.
+    fn of(o: DVec3, d: DVec3) -> Option<Self> {
+        let ends = [-1.0, 1.0].map(|side| (DVec3::splat(side) - o) / d);
+        let enter = ends[0].min(ends[1]).max_element();
+        let leave = ends[0].max(ends[1]).min_element();
+        let c = [o.x * o.y - o.z, o.x * d.y + o.y * d.x - d.z, d.x * d.y];
+        let span = [enter, leave];
+        (leave > enter).then_some(Self { span, c })
+    }
+
+    fn value(&self, t: f64) -> f64 {
+        self.c[0] + t * (self.c[1] + t * self.c[2])
+    }
+
+    fn slope(&self, t: f64) -> f64 {
+        self.c[1] + 2.0 * t * self.c[2]
+    }
+
+    /// The first root after `start`, and in the cube.
+    fn root_after(&self, start: f64) -> Option<f64> {
+        let [c, h, a] = [self.c[0], 0.5 * self.c[1], self.c[2]];
+        let square = h * h - a * c;
+        let s = -(h + h.signum() * square.max(0.0).sqrt());
+        let mut roots = [s / a, c / s];
+        roots.sort_by(f64::total_cmp);
+        let found = roots.into_iter().find(|t| *t > start && *t < self.span[1]);
+        found.filter(|_| square > 0.0)
+    }
+
+    /// Whether rounding decides what is met: an edge of the cube, a line that nearly touches the surface, or meets it where it meets the
+    /// cube.
+    fn is_delicate(&self) -> bool {
+        const NEAR: f64 = 1e-3;
+        let [enter, leave] = self.span;
+        let level = (-0.5 * self.c[1] / self.c[2]).clamp(enter, leave);
+        let near = |t: f64| self.value(t).abs() < NEAR;
+        leave - enter < NEAR || near(enter) || near(leave) || near(level)
+    }
+}
+
+fn saddle(b: &Backend) -> Result<Vec<Measure>, Trouble> {
+    let rays = if b.open_gpu().is_some() {
+        200_000
+    } else {
+        40_000
+    };
+    let mut measures = Vec::new();
+    for (name, bsdf) in [("opaque", grey(0.5)), ("glass", GLASS)] {
+        let scene = Build::new(v(0.0, 0.0, 5.0), DVec3::ZERO, 40.0)
+            .add(saddle_volume(), bsdf)
+            .light(v(0.0, 0.0, 9.0), -DVec3::Z, 0.1, 1.0);
+        let range = Range::new(b, &scene, None);
+        let number = range.number(|_| true);
+        let medium = range.world().primitives[0].solid;
+        let mut dice = Dice::new(12);
+        let shots: Vec<Shot> = (0..rays)
+            .map(|_| {
+                let from = dice.direction() * dice.between(2.0, 6.0);
+                Shot::free(from, dice.point(1.3) - from)
+            })
+            .filter(|s| OnLine::of(s.origin, s.direction).is_none_or(|line| !line.is_delicate()))
+            .collect();
+        // What `landing` is off where the answer is `expected`: an error of the place is one along the ray over the slope there.
+        let wrong = |shot: &Shot, landing: &Landing, expected: Option<f64>, slope: f64| {
+            let slack = 64.0 * b.epsilon() * (1.0 + shot.origin.length()) / slope.abs().min(1.0);
+            match expected {
+                None => landing.surface == Some(number),
+                Some(t) => {
+                    landing.surface != Some(number)
+                        || !landing.is_finite()
+                        || (landing.t - t).abs() > slack
+                }
+            }
+        };
+        let landings = range.shoot(&shots)?;
+        let mut mistakes = 0;
+        let mut through = Vec::new();
+        for (shot, landing) in shots.iter().zip(&landings) {
+            let line = OnLine::of(shot.origin, shot.direction);
+            let expected = line.as_ref().and_then(|line| {
+                let capped = line.value(line.span[0]) > 0.0;
+                let root = || line.root_after(line.span[0]);
+                if capped { Some(line.span[0]) } else { root() }
+            });
+            let slope = match (&line, expected) {
+                (Some(line), Some(t)) if t > line.span[0] => line.slope(t),
+                // Of a cap: the largest side of a direction.
+                _ => 0.5,
+            };
+            mistakes += usize::from(wrong(shot, landing, expected, slope));
+            if medium != 0
+                && landing.surface == Some(number)
+                && let (Some(line), Some(t)) = (line, expected)
+            {
+                let next = line.root_after(t.max(line.span[0]) + 1e-6);
+                let to = next.unwrap_or(line.span[1]);
+                let slope = next.map_or(0.5, |t| line.slope(t));
+                let from = Shot::from(landing, shot.direction, medium);
+                through.push((from, to - t, slope));
+            }
+        }
+        measures.push(Measure::none(
+            format!("{name}: wrong of {}", shots.len()),
+            mistakes,
+        ));
+        if medium == 0 {
+            continue;
+        }
+        let inside: Vec<Shot> = through.iter().map(|(shot, ..)| *shot).collect();
+        let landings = range.shoot(&inside)?;
+        let mistakes = landings
+            .iter()
+            .zip(&through)
+            .filter(|(landing, (shot, t, slope))| wrong(shot, landing, Some(*t), 0.2 * slope))
             .count();
         measures.push(Measure::none(
             format!(

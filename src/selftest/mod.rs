@@ -1,7 +1,7 @@
 //! The hard cases: scenes, rays and functions with known answers, run on an adapter or on the CPU reference.
 //!
 //! Every expected value is a closed form or a published number; none is computed by the code under test. Rows 1 to 43
-//! are those of the project's table of hard cases; L1 and L2 test rays that leave and touch surfaces, L3 light paths, I1 and I2
+//! are those of the project's table of hard cases; L1 and L2 test rays that leave and touch surfaces, L3 light paths, I1 to I3
 //! implicit surfaces.
 
 mod backend;
@@ -86,7 +86,7 @@ mod tests {
     fn every_row_of_the_table_is_there_once() {
         let rows: Vec<&str> = cases().iter().map(|c| c.row).collect();
         let mut expected: Vec<String> = (1..=43).map(|n| n.to_string()).collect();
-        expected.extend(["I1", "I2", "L1", "L2", "L3"].map(str::to_owned));
+        expected.extend(["I1", "I2", "I3", "L1", "L2", "L3"].map(str::to_owned));
         assert_eq!(rows, expected);
     }
 }

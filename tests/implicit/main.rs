@@ -3,14 +3,21 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod cubics;
 mod pictures;
 mod rays;
 mod smooth;
 mod volumes;
 
-/// Formulas with the text of their bounds, each for another reason: a quartic, a surface with cusps, one with many double points, a
+/// Formulas with the text of their bounds, each for another reason: a quadric, one with a cusp, a quartic, a surface with cusps, one with many double points, a
 /// periodic sheet, sums of exponentials, a body with edges, quotients and roots.
 const SURFACES: &[(&str, &str, &str)] = &[
+    (
+        "sphere",
+        "x^2 + y^2 + z^2 - 1",
+        "{ min = [-1.1, -1.1, -1.1], max = [1.1, 1.1, 0.7] }",
+    ),
+    ("cusp", "x^2 + y^2 - 0.5 z^3", "{ radius = 1.2 }"),
     (
         "torus",
         "(x^2 + y^2 + z^2 + 0.91)^2 - 4 (x^2 + y^2)",

@@ -1,6 +1,16 @@
 //! Pictures of formulas against those of the surfaces that they describe.
 
-use crate::common::{block_means, film, gpu, scene, settings, worst_t};
+use crate::common::{block_means, cpu, film, gpu, scene, settings, worst_t};
+use etendue::files::npy::header;
+use etendue::gpu::probe::Uniform;
+use etendue::reference::Estimator;
+use etendue::scene::parse::parse_str;
+use std::path::Path;
+
+type Runs = Vec<Vec<[f64; 3]>>;
+
+/// Of pictures that the reference makes too.
+const SMALL: [u32; 2] = [24, 18];
 
 const RUNS: u32 = 8;
 const SIZE: [u32; 2] = [48, 36];
@@ -137,4 +147,108 @@ fn solids_nest() {
     let things = round("[0.1, 0.9, 0]", 0.8) + "material = 'thing'\n" + inner;
     let worst = worst_t(&plain, &runs(&inside(solid(things)), 100));
     assert!(worst.p * worst.tests as f64 > FALSE_ALARM, "{worst:?}");
+}
+
+/// A lump of noise in coarse cells, the same on every run.
+fn lump(center: [f64; 3], half: f64) -> String {
+    let origin = center.map(|c| c - half);
+    let spacing = [2.0 * half / (SIDE - 1) as f64; 3];
+    format!(
+        "[[isosurface]]\nfile = 'lump.npy'\norigin = {origin:?}\nspacing = {spacing:?}\nlevel = 20000.5\n"
+    )
+}
+
+/// Points along each axis of a lump.
+const SIDE: usize = 7;
+
+/// Its file.
+fn lump_file() -> Vec<u8> {
+    let mut r = Uniform(9);
+    let along = |k: usize| 2.0 * k as f64 / (SIDE - 1) as f64 - 1.0;
+    let numbers = (0..SIDE.pow(3)).map(|i| {
+        let p = [i % SIDE, i / SIDE % SIDE, i / SIDE / SIDE].map(along);
+        let out = p.map(|x| x * x).iter().sum::<f64>().sqrt();
+        (60_000.0 * (1.0 - 0.7 * out) * (0.6 + 0.4 * r.next())).max(0.0) as u16
+    });
+    let bytes = numbers.flat_map(u16::to_le_bytes);
+    header("<u2", &[SIDE as u64; 3])
+        .into_iter()
+        .chain(bytes)
+        .collect()
+}
+
+/// Means of blocks of pictures by the kernel, and by the reference.
+fn both(folder: &Path, text: &str) -> [Runs; 2] {
+    let scene = parse_str(&folder.join("test.toml"), text).unwrap_or_else(|e| panic!("{e:?}"));
+    let kernel = (0..RUNS).map(|k| {
+        let settings = settings(&scene, SMALL, k);
+        block_means(&film(&mut gpu(&scene, &settings, None), &settings, 256), 6)
+    });
+    let reference = (0..RUNS).map(|k| {
+        let settings = settings(&scene, SMALL, 500 + k);
+        let mut engine = cpu(&scene, &settings, Estimator::LightSampling);
+        block_means(&film(&mut engine, &settings, 64), 6)
+    });
+    [kernel.collect(), reference.collect()]
+}
+
+/// Volumes where other surfaces stand in trees, in crowds of more things than are met one by one, and in glass: as bright as the reference
+/// says.
+#[test]
+fn volumes_beside_other_surfaces() {
+    let bubble = "[material.bubble]\ntype = 'dielectric'\nior = 0.6667\n";
+    let ball = "[[sphere]]\ncenter = [0.1, 0.9, 0]\nradius = 0.8\nmaterial = 'thing'\n";
+    let free = lump([0.2, 0.9, 0.0], 0.7);
+    let inner = lump([0.1, 0.9, 0.0], 0.45);
+    let other = lump([-0.7, 0.5, 0.3], 0.4);
+    let folder = tempfile::tempdir().expect("temporary folder");
+    std::fs::write(folder.path().join("lump.npy"), lump_file()).expect("written");
+    let [matt, mirror, glass, phong] = MATERIALS;
+    let crowded = |thing: &str| crowd() + thing;
+    let small = "[[sphere]]\ncenter = [0.1, 0.9, 0]\nradius = 0.1\nmaterial = 'bubble'\n";
+    for (name, text) in [
+        ("alone", room(glass, &free)),
+        ("matt in a crowd", room(matt, &crowded(&free))),
+        ("mirror in a crowd", room(mirror, &crowded(&free))),
+        ("glass in a crowd", room(glass, &crowded(&free))),
+        (
+            "two, glossy, in a crowd",
+            room(phong, &crowded(&(other + "material = 'white'\n" + &free))),
+        ),
+        (
+            "a bubble in a ball of glass",
+            room(
+                glass,
+                &format!("{ball}{inner}material = 'bubble'\n{}", ball_aside()),
+            ) + bubble,
+        ),
+        (
+            "matt in a ball of glass, in a crowd",
+            room(
+                glass,
+                &crowded(&format!(
+                    "{ball}{inner}material = 'white'\n{}",
+                    ball_aside()
+                )),
+            ),
+        ),
+        (
+            "glass with a bubble in it, in a crowd",
+            room(glass, &crowded(&format!("{small}{free}"))) + bubble,
+        ),
+    ] {
+        let [kernel, reference] = both(folder.path(), &text);
+        let worst = worst_t(&kernel, &reference);
+        println!("{name}: {worst:?}");
+        assert!(worst.tests > 0, "{name}");
+        assert!(
+            worst.p * worst.tests as f64 > FALSE_ALARM,
+            "{name}: {worst:?}"
+        );
+    }
+}
+
+/// The last thing of a room, which gets its material there.
+fn ball_aside() -> &'static str {
+    "[[sphere]]\ncenter = [1.1, 0.3, 0.5]\nradius = 0.3"
 }

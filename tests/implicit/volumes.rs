@@ -55,7 +55,10 @@ fn volumes() -> Vec<(&'static str, Implicit)> {
             40 * (i % 7) as u16
         }
     });
+    // A shell of less than a cell.
+    let shell = |p: DVec3| 0.03 - (p.length() - 0.7).abs();
     vec![
+        ("shell", of([32; 3], floats(sampled([32; 3], shell)), 0.0)),
         ("ball", of([24; 3], floats(sampled([24; 3], ball)), 0.0)),
         (
             "blobs",
@@ -82,7 +85,7 @@ fn volumes() -> Vec<(&'static str, Implicit)> {
 }
 
 /// A scene of one such surface, with the eye far outside.
-fn scene_of(implicit: &Implicit, material: &str) -> Scene {
+pub fn scene_of(implicit: &Implicit, material: &str) -> Scene {
     let scene = Scene::builder()
         .camera([0.3, 0.4, 50.0], [0.01, 0.02, 0.03], 40.0, [8, 8])
         .diffuse("white", [0.5; 3])
@@ -149,7 +152,7 @@ fn a_million_rays_of_each_volume() {
 }
 
 /// The distance from a point, less a radius, at so many points a side of a cube from -1 to 1.
-fn distances(side: usize, radius: f64) -> Implicit {
+pub fn distances(side: usize, radius: f64) -> Implicit {
     let all = sampled([side; 3], |p| radius - (p - DVec3::splat(0.013)).length());
     let numbers = Numbers::F32(all.into_iter().map(|x| x as f32).collect());
     let volume = Volume::new([side; 3], numbers).unwrap_or_else(|e| panic!("{e}"));

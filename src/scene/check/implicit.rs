@@ -3,7 +3,8 @@
 use super::geometry::directions;
 use super::{Warnings, called};
 use crate::implicit::arithmetic::Strict;
-use crate::implicit::{Clip, Implicit};
+use crate::implicit::volume::Plateaus;
+use crate::implicit::{Clip, Grid, Implicit};
 use crate::scene::source::quoted;
 use crate::scene::{Primitive, Scene, Shape};
 use glam::DVec3;
@@ -51,6 +52,10 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
             let level = implicit.level;
             // What only touches the level has no inside.
             if (low..=high).contains(&level) {
+                let found = grid.volume.plateaus(level);
+                if found.cells > 0 {
+                    warnings.add(p.place(), || on_plateaus(&name(), grid, level, found));
+                }
                 continue;
             }
             let what = match (level < low) == grid.above && implicit.closed {
@@ -118,6 +123,27 @@ pub(super) fn warnings(scene: &Scene) -> Warnings {
         }
     }
     warnings
+}
+
+/// What to say of a volume that equals its level in whole cells.
+fn on_plateaus(name: &str, grid: &Grid, level: f64, found: Plateaus) -> String {
+    // Numbers that equal the level are not inside now. So it is with a level on the other side of them.
+    let sides = if grid.above {
+        [found.above, found.below]
+    } else {
+        [found.below, found.above]
+    };
+    let next = sides.into_iter().flatten().next();
+    let between = next.map(|n| level + 0.5 * (n - level));
+    let between = between.filter(|b| *b != level && Some(*b) != next);
+    format!(
+        "{} of the numbers of {name} equal its level {level}, and {} of its cells have nothing else: the surface has no place there{}",
+        found.numbers,
+        found.cells,
+        between.map_or_else(String::new, |b| format!(
+            "; a level between the numbers, such as {b}, gives it one"
+        ))
+    )
 }
 
 /// Surfaces that their bounds cut.
@@ -189,6 +215,10 @@ fn may_have_root(implicit: &Implicit) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::tests::warned;
+    use crate::files::npy::Numbers;
+    use crate::implicit::volume::Volume;
+    use crate::implicit::{Grid, Implicit};
+    use crate::scene::Scene;
 
     fn with(f: &str, keys: &str) -> String {
         format!("[[implicit]]\nf = '{f}'\nbounds = {{ radius = 1 }}\nmaterial = 'white'\n{keys}\n")
@@ -220,6 +250,49 @@ mod tests {
         let text = with("2a x^2 + y^2 + z^2 - 0.5 exp_", keys);
         assert!(warned(&text, "parameter \"r\" of the implicit at line"));
         assert!(!warned(&text, "parameter \"a\"") && !warned(&text, "\"exp_\""));
+    }
+
+    #[test]
+    fn volumes_that_are_level_where_they_have_their_level() {
+        // A block of 3 among 0, and one point of 7.
+        let mut numbers = vec![0u8; 6 * 6 * 6];
+        for z in 1..4 {
+            for y in 1..4 {
+                for x in 1..4 {
+                    numbers[x + 6 * (y + 6 * z)] = 3;
+                }
+            }
+        }
+        numbers[5 + 6 * (5 + 6 * 5)] = 7;
+        let volume = Volume::new([6; 3], Numbers::U8(numbers)).expect("a volume");
+        let of = |level: f64, above: bool| {
+            let mut grid = Grid::new(volume.clone(), glam::DVec3::ONE);
+            grid.above = above;
+            let scene = Scene::builder()
+                .camera([9.0, 8.0, 30.0], [2.0, 2.0, 2.0], 40.0, [8, 8])
+                .diffuse("white", [0.5; 3])
+                .isosurface(&Implicit::of_volume(grid, level), "white")
+                .light([0.0, 40.0, 0.0], [0.0, -1.0, 0.0], 1.0, [1.0; 3])
+                .build();
+            let scene = scene.unwrap_or_else(|e| panic!("{e}"));
+            let all = super::warnings(&scene).first;
+            all.into_iter()
+                .map(|(_, message)| message)
+                .collect::<Vec<_>>()
+        };
+        let said = of(3.0, true);
+        assert!(
+            said.len() == 1
+                && said[0].starts_with("27 of the numbers of the isosurface")
+                && said[0].contains("equal its level 3, and 8 of its cells have nothing else")
+                && said[0].contains("such as 5, gives it one"),
+            "{said:?}"
+        );
+        assert!(of(3.0, false)[0].contains("such as 1.5, gives"));
+        assert!(of(0.0, true)[0].contains("such as 1.5, gives"));
+        // Nothing is below 0.
+        assert!(of(0.0, false)[0].contains("such as 1.5, gives"));
+        assert!(of(2.5, true).is_empty() && of(7.0, true).is_empty());
     }
 
     #[test]
