@@ -154,3 +154,126 @@ impl Grid {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::Bounds;
+    use glam::DVec3;
+
+    /// Numbers between 0 and 1, the same every time.
+    struct Numbers(u64);
+
+    impl Numbers {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005) + 1_442_695_040_888_963_407;
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+
+        fn vector(&mut self) -> DVec3 {
+            let mut next = || 2.0 * self.next() - 1.0;
+            DVec3::new(next(), next(), next())
+        }
+    }
+
+    /// What a walk reads of a node: the step, and the least and the greatest coordinate of a child, by axis. Without rounding.
+    fn read(unit: &Unit, child: usize) -> [[f64; 3]; 3] {
+        let [a, b, c, _] = unit;
+        assert!(a[3] & NODE != 0 && child < (a[3] >> 24 & 7) as usize);
+        let high = [b[3], c[0], c[1]];
+        [0, 1, 2].map(|k| {
+            let step = f64::from(f32::from_bits((a[3] >> (8 * k) & 255) << 23));
+            let byte = |word: u32| f64::from(word >> (8 * child) & 255);
+            let at = |word| f64::from(f32::from_bits(a[k])) + byte(word) * step;
+            [step, at(b[k]), at(high[k])]
+        })
+    }
+
+    /// Boxes of one to four children, about as large as `size`, around a point `offset` away from the origin.
+    fn families(size: f64, offset: f64, numbers: &mut Numbers) -> Vec<Vec<Bounds>> {
+        let middle = offset * numbers.vector();
+        let ball = |at: DVec3, r: f64| Bounds::about(middle + at, DVec3::splat(r));
+        let mut all = Vec::new();
+        for count in 1..=4 {
+            let mut some = |of: &mut dyn FnMut(&mut Numbers, usize) -> Bounds| {
+                all.push((0..count).map(|i| of(numbers, i)).collect());
+            };
+            // Of all sizes, equal ones, the same one, points, one point.
+            some(&mut |n, _| ball(size * n.vector(), size * n.next().powi(8)));
+            some(&mut |n, _| ball(size * n.vector(), 0.1 * size));
+            some(&mut |_, _| ball(DVec3::ZERO, size));
+            some(&mut |n, _| ball(size * n.vector(), 0.0));
+            some(&mut |_, _| ball(DVec3::ZERO, 0.0));
+            // Flat along one axis, and in one plane; side by side, with sides in common.
+            some(&mut |n, i| {
+                let mut half = size * n.vector().abs();
+                half[i % 3] = 0.0;
+                Bounds::about(middle + size * n.vector(), half)
+            });
+            some(&mut |n, _| {
+                let flat = DVec3::new(1.0, 0.0, 1.0);
+                Bounds::about(
+                    middle + size * flat * n.vector(),
+                    size * flat * n.vector().abs(),
+                )
+            });
+            some(&mut |_, i| ball(DVec3::X * (2.0 * size * i as f64), size));
+            // A giant and dust.
+            some(&mut |n, i| ball(size * n.vector(), size * 1e-3f64.powi(i as i32)));
+        }
+        all
+    }
+
+    #[test]
+    fn a_node_holds_its_children_in_all_sizes_and_places() {
+        // What a walk's rounding errors come to, in parts of the greatest coordinate: see `Grid::new`.
+        const ERRORS: f64 = 7.0 / (1 << 24) as f64;
+        let mut numbers = Numbers(1);
+        let scales = || (-6..=6).step_by(2).map(|e| 10f64.powi(e));
+        for (size, offset) in scales().flat_map(|s| {
+            std::iter::once(0.0)
+                .chain(scales())
+                .map(move |offset| (s, offset))
+        }) {
+            for family in families(size, offset, &mut numbers) {
+                let boxes: Vec<Box32> = Tree::new(&family).nodes[1..]
+                    .iter()
+                    .filter(|n| matches!(n.below, Below::Item(_)))
+                    .map(|n| n.bounds)
+                    .collect();
+                // A box alone is the root. The builder sorts the others.
+                let boxes = match family.len() {
+                    1 => vec![Tree::new(&family).nodes[0].bounds],
+                    _ => boxes,
+                };
+                assert_eq!(boxes.len(), family.len());
+                let unit = node(&boxes, 7);
+                assert_eq!(unit[2][2], 7);
+                for (i, b) in boxes.iter().enumerate() {
+                    for (k, [step, low, high]) in read(&unit, i).into_iter().enumerate() {
+                        let side = |of: fn(f32, f32) -> f32, s: fn(&Box32) -> [f32; 3]| {
+                            f64::from(boxes.iter().map(|b| s(b)[k]).reduce(of).expect("a box"))
+                        };
+                        let (least, greatest) =
+                            (side(f32::min, |b| b.min), side(f32::max, |b| b.max));
+                        let far = least.abs().max(greatest.abs());
+                        let (min, max) = (f64::from(b.min[k]), f64::from(b.max[k]));
+                        let what =
+                            || format!("{size} {offset} {boxes:?}: {min} {max} in {low} {high}");
+                        assert!(low <= min - ERRORS * far, "{}", what());
+                        assert!(high >= max + ERRORS * far, "{}", what());
+                        // The grid is no coarser than it must be, and a child's box on it no larger.
+                        let room = 1e-6 * far + 1e-24;
+                        assert!(
+                            step <= (greatest - least + 4.0 * room) / 127.0,
+                            "{}",
+                            what()
+                        );
+                        assert!(min - low <= step + room, "{}", what());
+                        assert!(high - max <= step + room, "{}", what());
+                    }
+                }
+            }
+        }
+    }
+}

@@ -149,3 +149,35 @@ fn a_crowd_far_from_others_gets_a_tree_of_its_own() {
     every.sort_unstable();
     assert_eq!(every, of(0..20_000));
 }
+
+#[test]
+fn boxes_in_f32_hold_what_they_bound_in_all_sizes_and_places() {
+    // The rounding errors of what a box bounds: the corners', and those of a test in f32, which are a few units in the last place of
+    // the corners.
+    const ERRORS: f64 = 8.0 / (1 << 24) as f64;
+    for (size, offset) in (-6..=6).flat_map(|s| (-7..=6).map(move |o| (s, o))) {
+        let far = if offset < -6 { 0.0 } else { 10f64.powi(offset) };
+        let size = 10f64.powi(size);
+        for i in 0..40 {
+            let middle = far * (scattered(i) - 5.0);
+            // Cubes, flat boxes and points.
+            let half = match i % 4 {
+                0 => DVec3::splat(size),
+                1 => size * scattered(i + 40),
+                2 => size * DVec3::new(1.0, 0.0, 0.3),
+                _ => DVec3::ZERO,
+            };
+            let exact = Bounds::about(middle, half);
+            let b = Box32::outwards(&exact);
+            let reach = exact.min.abs().max(exact.max.abs()).element_sum();
+            for k in 0..3 {
+                let (min, max) = (f64::from(b.min[k]), f64::from(b.max[k]));
+                let corner = exact.min[k].abs().max(exact.max[k].abs());
+                assert!(min < exact.min[k] - ERRORS * corner, "{exact:?} {b:?}");
+                assert!(max > exact.max[k] + ERRORS * corner, "{exact:?} {b:?}");
+                let room = 2e-6 * reach + 1e-40;
+                assert!(min > exact.min[k] - room && max < exact.max[k] + room);
+            }
+        }
+    }
+}
