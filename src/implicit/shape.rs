@@ -259,7 +259,7 @@ impl Implicit {
                 }
             }
             Function::Grid(grid) => {
-                words.extend([u64::from(grid.above), u64::from(grid.smooth)]);
+                words.push(u64::from(grid.above) | u64::from(grid.smooth) << 1);
                 let digest = grid.volume.digest();
                 let (eights, _) = digest.as_chunks();
                 words.extend(eights.iter().map(|b| u64::from_le_bytes(*b)));
