@@ -5,7 +5,7 @@
 fn film_position(pixel: u32, s: u32, seed: u32, k: u32, across: u32) -> vec2f {
     let jitter = vec2f(hash_pixel(pixel, s + (k << GLANCE_SHIFT), seed) >> vec2u(8u)) * 0x1.0p-24;
     let share = vec2f(f32((k - 1u) & (across - 1u)), f32((k - 1u) >> (across >> 1u)));
-    return in_stratum(pixel, s, seed, select(jitter, (share + jitter) * (1.0 / f32(across)), k > 0u));
+    return in_stratum(pixel, s, seed, select(jitter, (share + jitter) * (1.0 / f32(across)), k > 0u), k == 0u);
 }
 
 fn camera_ray(pixel: vec2u, within: vec2f) -> Ray {

@@ -10,6 +10,8 @@ const GLANCE_STREAM: u32 = 0x9e3779b9u;
 const COIN_STREAM: u32 = 0x7f4a7c15u;
 // Into the seed of a replicate's shifts of its low-discrepancy numbers.
 const SHIFT_STREAM: u32 = 0x5bd1e995u;
+// Into the seed of what scrambles places in the pixel together with points on lights.
+const TOGETHER_STREAM: u32 = 0x1b873593u;
 // Into the seed of the order in which a pixel's strata are visited.
 const ORDER_STREAM: u32 = 0xffffffffu;
 // Into the seed of the host's pilots, whose samples are in no picture.
@@ -81,7 +83,7 @@ fn draw_vertex(key: vec4u, first: bool, glossy: bool) -> Draws {
     let i = round / REPLICATES * ROUND_SAMPLES + key.y % ROUND_SAMPLES;
     let spread = draw_spread(key.x, round % REPLICATES, i, key.w);
     return Draws(
-        select(u.light_point, spread.light_point, first),
+        select(u.light_point, first_light_point(key.x, key.y, key.w, spread.light_point), first),
         select(u.direction, spread.direction, first),
         select(u.light, spread.light, first),
         select(u.lobe, spread.lobe, first & glossy),
@@ -104,7 +106,7 @@ fn draw_spread(pixel: u32, replicate: u32, i: u32, seed: u32) -> SpreadDraws {
     let shift = hash_pixel(pixel, replicate, seed ^ SHIFT_STREAM);
     let more = (shift ^ (shift >> vec2u(16u))) * 0x9e3779b1u;
     let light = vec3u(shift.x ^ more.y, shift) + i * vec3u(0xd1b54a33u, 0xabc98389u, 0x8cb92ba7u);
-    let x = reverseBits(i);
+    let x = direction_order(pixel, replicate, i, seed);
     var y = x ^ (x << 16u);
     y ^= (y & 0x00ff00ffu) << 8u;
     y ^= (y & 0x0f0f0f0fu) << 4u;

@@ -45,7 +45,7 @@ fn permute_step(i: u32, mask: u32, p: u32) -> u32 {
 }
 
 // Moves `jitter`, uniform in [0, 1)^2, into the cell of sample s.
-fn in_stratum(pixel: u32, s: u32, seed: u32, jitter: vec2f) -> vec2f {
+fn in_stratum(pixel: u32, s: u32, seed: u32, jitter: vec2f, own: bool) -> vec2f {
     let cell = shuffled_cell(s % ROUND_SAMPLES, ROUND_SAMPLES, hash_pixel(pixel, s / ROUND_SAMPLES, seed ^ ORDER_STREAM).x);
     let corner = vec2f(f32(cell % STRATA), f32(cell / STRATA));
     return (corner + jitter) * (1.0 / f32(STRATA));

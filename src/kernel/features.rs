@@ -123,6 +123,9 @@ pub(super) struct Features {
     pub sight: u32,
     /// Strata along a pixel's side.
     pub strata: u32,
+    /// Places in the pixel are drawn together with points on lights. In scenes of many things every pixel has edges, and edges of
+    /// shadows. Large things are no less noisy with it, and a kernel without trees would be a twentieth slower.
+    pub draws_together: bool,
     /// Number of the last vertex that can matter, for the light that is kept.
     pub last_depth: u32,
     /// Some paths are cut there that could still find light.
@@ -189,6 +192,7 @@ impl Features {
             evaluates: light_sampling,
             sight: glances::sight(world, settings, access),
             strata: settings.strata,
+            draws_together: access == Access::Tree && settings.strata.is_power_of_two(),
             last_depth,
             count_truncated: settings.max_depth < needed_depth(settings),
             materials,
@@ -215,6 +219,7 @@ impl Features {
             evaluates: probe.glossy,
             sight: 0,
             strata: probe.strata,
+            draws_together: probe.draws_together,
             last_depth: 64,
             count_truncated: false,
         }

@@ -154,6 +154,8 @@ pub struct ProbeFeatures {
     pub glossy: bool,
     /// Strata along a pixel's side.
     pub strata: u32,
+    /// Places in the pixel are drawn together with points on lights, as in kernels with trees. Strata are a power of two.
+    pub draws_together: bool,
 }
 
 impl Default for ProbeFeatures {
@@ -161,6 +163,7 @@ impl Default for ProbeFeatures {
         Self {
             glossy: false,
             strata: 1,
+            draws_together: false,
         }
     }
 }

@@ -34,6 +34,8 @@ modules! {
     STRATA_ONE = "strata/one",
     STRATA_POWER_OF_TWO = "strata/power_of_two",
     STRATA_ANY = "strata/any",
+    STRATA_APART = "strata/apart",
+    STRATA_TOGETHER = "strata/together",
     SURFACE = "shape/surface",
     DISK = "shape/disk",
     CYLINDER = "shape/cylinder",
@@ -176,21 +178,15 @@ fn scattering(f: &Features) -> Module {
 /// All that the path loop calls, and probes call without one. Templates of walks are not among it.
 pub(super) fn of_scene(f: &Features) -> Vec<Module> {
     let strata = match f.strata {
-        1 => STRATA_ONE,
-        n if n.is_power_of_two() => STRATA_POWER_OF_TWO,
-        _ => STRATA_ANY,
+        _ if f.draws_together => vec![STRATA_TOGETHER],
+        1 => vec![STRATA_ONE, STRATA_APART],
+        n if n.is_power_of_two() => vec![STRATA_POWER_OF_TWO, STRATA_APART],
+        _ => vec![STRATA_ANY, STRATA_APART],
     };
     let glossy = f.glossy();
-    let mut modules = vec![
-        RAY,
-        FRAME,
-        SAMPLER,
-        strata,
-        CAMERA,
-        INTERACTION,
-        SURFACE,
-        DISK,
-    ];
+    let mut modules = vec![RAY, FRAME, SAMPLER];
+    modules.extend(strata);
+    modules.extend([CAMERA, INTERACTION, SURFACE, DISK]);
     let shapes = [
         (ShapeKind::Cylinder, CYLINDER),
         (ShapeKind::Plane, PLANE),

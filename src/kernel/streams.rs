@@ -59,6 +59,11 @@ mod tests {
                 add(&mut hashed, seed, name("place"));
                 add(&mut hashed, seed ^ stream("COIN_STREAM"), name("coin"));
                 add(&mut hashed, seed ^ stream("ORDER_STREAM"), name("order"));
+                add(
+                    &mut drawn,
+                    seed ^ stream("TOGETHER_STREAM"),
+                    name("place and point together"),
+                );
             }
         }
     }

@@ -378,3 +378,102 @@ fn strata_are_permuted() {
         );
     }
 }
+
+/// The number of points in each of 2^bits[0] x 2^bits[1] x ... boxes of the unit cube.
+fn box_counts(points: &[[f32; 4]], bits: [u32; 4]) -> Vec<u32> {
+    let mut counts = vec![0; 1 << bits.iter().sum::<u32>()];
+    for p in points {
+        let place = (0..4).fold(0, |k, d| {
+            (k << bits[d]) | (p[d] * (1u32 << bits[d]) as f32) as usize
+        });
+        counts[place] += 1;
+    }
+    counts
+}
+
+#[test]
+fn places_and_points_are_even_together() {
+    const SAMPLES: usize = 256;
+    let pixels = 240;
+    let inputs: Vec<Values> = (0..pixels * SAMPLES)
+        .map(|i| {
+            let mut x = [0.0; 16];
+            (x[0], x[1]) = ((i / SAMPLES) as f32, (i % SAMPLES) as f32);
+            x
+        })
+        .collect();
+    let body = "
+        let pixel = u32(x[0]) * 65537u;
+        let s = u32(x[1]);
+        let d = draw_together(pixel, s, 7u);
+        y[0] = d.x; y[1] = d.y; y[2] = d.z; y[3] = d.w;
+        let inside = in_stratum(pixel, s, 7u, vec2f(0.25, 0.75), false);
+        y[4] = inside.x; y[5] = inside.y;
+        let own = in_stratum(pixel, s, 7u, vec2f(0.25, 0.75), true);
+        y[6] = own.x; y[7] = own.y;
+        let point = first_light_point(pixel, s, 7u, vec2f(2.0));
+        y[8] = point.x; y[9] = point.y;
+        y[10] = f32(reverseBits(direction_order(pixel, 1u, s, 7u)) & 0xffffu);";
+    for strata in [1u32, 2, 4] {
+        let features = ProbeFeatures {
+            strata,
+            draws_together: true,
+            ..ProbeFeatures::default()
+        };
+        let out = probe_with(&features, body, &inputs);
+        let round = (strata * strata) as usize;
+        let mut all = Vec::new();
+        for y in out.chunks(SAMPLES) {
+            let mut replicates = vec![Vec::new(); 4];
+            for (s, y) in y.iter().enumerate() {
+                assert_eq!([y[6], y[7], y[8], y[9]], [y[0], y[1], y[2], y[3]]);
+                // What is put in the cell of a sample.
+                let cell = |x: f32| (x * strata as f32).floor();
+                assert_eq!([cell(y[4]), cell(y[5])], [cell(y[0]), cell(y[1])]);
+                let offset = [0, 1].map(|k| y[4 + k] * strata as f32 - cell(y[k]));
+                assert!((offset[0] - 0.25).abs() + (offset[1] - 0.75).abs() < 1e-5);
+                replicates[s / round % 4].push([y[0], y[1], y[2], y[3]]);
+            }
+            for points in &replicates {
+                // One sample of each round in each cell, and one of 2^k in each of 2^k boxes of any shape.
+                for k in [0, 2, 4, 6] {
+                    for some in points.chunks(1 << k) {
+                        for a in 0..=k {
+                            assert!(box_counts(some, [a, k - a, 0, 0]).iter().all(|n| *n == 1));
+                        }
+                        for bits in [[0, 0, k, 0], [0, 0, 0, k]] {
+                            assert!(box_counts(some, bits).iter().all(|n| *n == 1));
+                        }
+                    }
+                }
+                // In four dimensions too they are far more even than random points, of which some box of sixteen would have ten.
+                assert!(
+                    box_counts(points, [1; 4])
+                        .iter()
+                        .all(|n| (2..=6).contains(n)),
+                    "{:?}",
+                    box_counts(points, [1; 4])
+                );
+            }
+            // Replicates share nothing.
+            let first: Vec<[f32; 4]> = replicates.iter().map(|r| r[0]).collect();
+            assert!((0..4).all(|k| (0..k).all(|j| first[j] != first[k])));
+            all.extend(replicates.iter().map(|r| r[1]));
+            // Directions come in another order, which keeps blocks of 2^k samples together.
+            let order: Vec<usize> = y.iter().map(|y| y[10] as usize).collect();
+            for k in [1, 2, 4, 16, 64, 256] {
+                for block in order.chunks(k) {
+                    let mut seen: Vec<usize> = block.iter().map(|n| n % k).collect();
+                    seen.sort_unstable();
+                    assert!(seen.into_iter().eq(0..k));
+                    assert!(block.iter().all(|n| n / k == block[0] / k));
+                }
+            }
+        }
+        // Each sample by itself is anywhere.
+        for bits in [[2, 2, 0, 0], [0, 0, 2, 2], [1, 1, 1, 1]] {
+            let z = chi_square_z(&box_counts(&all, bits));
+            assert!(z.abs() < LIMIT, "strata {strata}, {bits:?}: z = {z}");
+        }
+    }
+}
