@@ -17,7 +17,7 @@ const ORDER_STREAM: u32 = 0xffffffffu;
 // Into the seed of the host's pilots, whose samples are in no picture.
 const PILOT_STREAM: u32 = 0xb5297a4du;
 // Into the seed of light paths, which have their number and pass where others have pixel and sample.
-const LIGHT_STREAM: u32 = 0x3c6ef372u;
+const LIGHT_STREAM: u32 = 0x510e527fu;
 // Shadow ray k has its number in the depth of its key, from this bit on.
 const SHADOW_RAY_SHIFT: u32 = 20u;
 // Glance k has its number in the sample of the key of its place in the pixel, from this bit on.

@@ -3,11 +3,12 @@
 
 mod common;
 
-use common::{add, film, gpu, named_scene, settings};
+use common::{add, film, generated, gpu, named_scene, settings};
 use etendue::engine::EngineError;
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
 use etendue::run::{CALL, Job, Run, tiles};
+use etendue::scene::{Scene, generate};
 use std::sync::atomic::AtomicBool;
 
 const SEEDS: u32 = 64;
@@ -48,9 +49,12 @@ fn ratio(squares: &[(f64, f64)]) -> (f64, f64) {
 }
 
 fn check(name: &str, size: [u32; 2]) {
-    let s = named_scene(name);
-    let settings = settings(&s, size, 0);
-    let mut engine = gpu(&s, &settings, None);
+    check_scene(name, &named_scene(name), size);
+}
+
+fn check_scene(name: &str, s: &Scene, size: [u32; 2]) {
+    let settings = settings(s, size, 0);
+    let mut engine = gpu(s, &settings, None);
     let reference = pixels(&film(&mut engine, &settings, REFERENCE_SAMPLES));
     let mut of_seeds = [const { Vec::new() }; SAMPLES.len()];
     for seed in 1..=SEEDS {
@@ -93,6 +97,13 @@ fn caustic() {
 #[test]
 fn several_lights() {
     check("several_lights", [32, 24]);
+}
+
+/// A scene with a tree: places in the pixel are drawn together with points on the light.
+#[test]
+fn crowd() {
+    let crowd = generated(&generate::cloud(200, 1, "rows.csv"));
+    check_scene("a cloud of 200 spheres", &crowd, [24, 18]);
 }
 
 /// Samples that went where pilots had found the noise: the error is as true, and the mean of all pictures is the reference.

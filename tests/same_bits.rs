@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::{gpu, read, scene_files};
+use common::{generated, gpu, read, scene_files};
 use etendue::engine::{Counters, Engine};
 use etendue::film::coverage::Rect;
 use etendue::film::{BLOCK, Film};
-use etendue::scene::Scene;
+use etendue::scene::{Scene, generate};
 use etendue::settings::{LightParts, Overrides, Settings};
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -25,6 +25,11 @@ fn three_materials() -> Scene {
         .find(|p| p.ends_with("three_materials.toml"))
         .expect("it is there");
     read(&file)
+}
+
+/// So many spheres that the kernel walks a tree, and draws places and points on the light together.
+fn crowd() -> Scene {
+    generated(&generate::cloud(100, 1, "rows.csv"))
 }
 
 fn settings(scene: &Scene, strata: u32) -> Settings {
@@ -67,10 +72,18 @@ fn go(
 
 #[test]
 fn cuts_tiles_and_regions_change_no_bit() {
-    let scene = three_materials();
-    for strata in [1, 2, 3] {
-        let settings = settings(&scene, strata);
-        let mut engine = gpu(&scene, &settings, None);
+    no_bit_is_changed_by_cuts(&three_materials(), &[1, 2, 3]);
+}
+
+#[test]
+fn nor_in_crowds() {
+    no_bit_is_changed_by_cuts(&crowd(), &[1, 2]);
+}
+
+fn no_bit_is_changed_by_cuts(scene: &Scene, strata: &[u32]) {
+    for &strata in strata {
+        let settings = settings(scene, strata);
+        let mut engine = gpu(scene, &settings, None);
         let film = || Film::new(SIZE, WHOLE, strata);
         let mut once = film();
         let counted = go(&mut engine, &mut once, WHOLE, 0..300, &[]);
@@ -91,7 +104,7 @@ fn cuts_tiles_and_regions_change_no_bit() {
         let mut resumed = film();
         go(&mut engine, &mut resumed, WHOLE, 0..100, &[33]);
         go(
-            &mut gpu(&scene, &settings, None),
+            &mut gpu(scene, &settings, None),
             &mut resumed,
             WHOLE,
             100..300,

@@ -55,15 +55,20 @@ mod tests {
                         own ^ stream("SHIFT_STREAM"),
                         name(&format!("shift of glance {glance}")),
                     );
+                    add(
+                        &mut drawn,
+                        own ^ stream("TOGETHER_STREAM"),
+                        name(&format!("place and point together of glance {glance}")),
+                    );
                 }
+                add(
+                    &mut drawn,
+                    seed ^ stream("LIGHT_STREAM"),
+                    name("light path"),
+                );
                 add(&mut hashed, seed, name("place"));
                 add(&mut hashed, seed ^ stream("COIN_STREAM"), name("coin"));
                 add(&mut hashed, seed ^ stream("ORDER_STREAM"), name("order"));
-                add(
-                    &mut drawn,
-                    seed ^ stream("TOGETHER_STREAM"),
-                    name("place and point together"),
-                );
             }
         }
     }

@@ -16,101 +16,65 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::DeValue;
 
+/// A kind of value that is one of a few names.
+trait Named: Copy + PartialEq + 'static {
+    const NAMES: &'static [(&'static str, Self)];
+
+    fn name(self) -> &'static str {
+        let named = Self::NAMES.iter().find(|(_, value)| *value == self);
+        named.expect("every value has a name").0
+    }
+}
+
+impl<T: Named> Value for T {
+    fn rule() -> String {
+        let names: Vec<String> = T::NAMES.iter().map(|(n, _)| format!("\"{n}\"")).collect();
+        names.join(" or ")
+    }
+
+    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
+        let name = found.get_ref().as_str();
+        let one = T::NAMES.iter().find(|(n, _)| Some(*n) == name);
+        one.map(|(_, value)| *value).ok_or_else(|| wrong(found))
+    }
+
+    fn schema() -> Json {
+        json!({"enum": T::NAMES.iter().map(|(n, _)| n).collect::<Vec<_>>()})
+    }
+
+    fn to_json(&self) -> Json {
+        json!(self.name())
+    }
+}
+
 /// Which side of the level is the inside.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Inside {
     above: bool,
 }
 
-const SIDES: [(&str, Inside); 2] = [
-    ("above", Inside { above: true }),
-    ("below", Inside { above: false }),
-];
-
-const ORDERS: [(&str, AxisOrder); 2] = [("zyx", AxisOrder::Zyx), ("xyz", AxisOrder::Xyz)];
-
-/// The one of `all` that a string names.
-fn named<T: Copy>(found: &Spanned<DeValue>, all: [(&str, T); 2]) -> Result<T, Wrong> {
-    let name = found.get_ref().as_str();
-    let one = all.into_iter().find(|(n, _)| Some(*n) == name);
-    one.map(|(_, value)| value).ok_or_else(|| wrong(found))
-}
-
-fn rule_of<T>(all: [(&str, T); 2]) -> String {
-    let [(a, _), (b, _)] = all;
-    format!("\"{a}\" or \"{b}\"")
-}
-
-impl Value for Inside {
-    fn rule() -> String {
-        rule_of(SIDES)
-    }
-
-    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
-        named(found, SIDES)
-    }
-
-    fn schema() -> Json {
-        json!({"enum": SIDES.map(|s| s.0)})
-    }
-
-    fn to_json(&self) -> Json {
-        json!(if self.above { "above" } else { "below" })
-    }
+impl Named for Inside {
+    const NAMES: &'static [(&'static str, Self)] = &[
+        ("above", Self { above: true }),
+        ("below", Self { above: false }),
+    ];
 }
 
 /// The normals about which light is scattered.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Normals {
     smooth: bool,
 }
 
-const NORMALS: [(&str, Normals); 2] = [
-    ("cell", Normals { smooth: false }),
-    ("smooth", Normals { smooth: true }),
-];
-
-impl Value for Normals {
-    fn rule() -> String {
-        rule_of(NORMALS)
-    }
-
-    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
-        named(found, NORMALS)
-    }
-
-    fn schema() -> Json {
-        json!({"enum": NORMALS.map(|n| n.0)})
-    }
-
-    fn to_json(&self) -> Json {
-        json!(if self.smooth { "smooth" } else { "cell" })
-    }
+impl Named for Normals {
+    const NAMES: &'static [(&'static str, Self)] = &[
+        ("cell", Self { smooth: false }),
+        ("smooth", Self { smooth: true }),
+    ];
 }
 
-impl Value for AxisOrder {
-    fn rule() -> String {
-        rule_of(ORDERS)
-    }
-
-    fn read(found: &Spanned<DeValue>) -> Result<Self, Wrong> {
-        named(found, ORDERS)
-    }
-
-    fn schema() -> Json {
-        json!({"enum": ORDERS.map(|o| o.0)})
-    }
-
-    fn to_json(&self) -> Json {
-        json!(name_of(*self))
-    }
-}
-
-fn name_of(order: AxisOrder) -> &'static str {
-    match order {
-        AxisOrder::Zyx => "zyx",
-        AxisOrder::Xyz => "xyz",
-    }
+impl Named for AxisOrder {
+    const NAMES: &'static [(&'static str, Self)] = &[("zyx", Self::Zyx), ("xyz", Self::Xyz)];
 }
 
 /// `[[isosurface]]`, but for its material.
@@ -202,7 +166,7 @@ pub(super) fn text(implicit: &Implicit, grid: &Grid, string: impl Fn(&str) -> St
         vector_text(grid.spacing),
     ];
     let rotation = rotation_text(implicit.rotation);
-    let order = name_of(grid.order);
+    let order = grid.order.name();
     format!(
         "file = {}\norder = \"{order}\"\nlevel = {level}\ninside = \"{}\"\norigin = {origin}\nspacing = {spacing}\nrotation = {rotation}\nclosed = {}\nnormals = \"{}\"\n",
         string(&grid.file),

@@ -8,7 +8,8 @@ use etendue::film::{BLOCK, Film};
 use etendue::gpu::{Choice, GpuEngine};
 use etendue::kernel::Access;
 use etendue::reference::{CpuEngine, Estimator};
-use etendue::scene::{Scene, parse};
+use etendue::scene::generate::Generated;
+use etendue::scene::{Diagnostic, Scene, parse};
 use etendue::settings::{Overrides, Settings};
 use etendue::world::World;
 use std::ops::Range;
@@ -41,15 +42,17 @@ pub fn read(path: &Path) -> Scene {
 
 /// Parses a scene given as text.
 pub fn scene(text: &str) -> Scene {
-    parse::parse_str(Path::new("test.toml"), text).unwrap_or_else(|e| {
-        panic!(
-            "{}",
-            e.iter()
-                .map(|d| d.to_string())
-                .collect::<Vec<_>>()
-                .join("\n")
-        )
-    })
+    or_panic(parse::parse_str(Path::new("test.toml"), text))
+}
+
+/// Parses a generated scene.
+pub fn generated(scene: &Generated) -> Scene {
+    or_panic(scene.parse(Path::new("test.toml")))
+}
+
+fn or_panic(read: Result<Scene, Vec<Diagnostic>>) -> Scene {
+    let lines = |all: Vec<Diagnostic>| all.iter().map(|d| format!("{d}\n")).collect::<String>();
+    read.unwrap_or_else(|all| panic!("{}", lines(all)))
 }
 
 /// Settings for a picture of `size` with a seed.
