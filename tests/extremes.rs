@@ -15,7 +15,7 @@ use etendue::scene::check::lint;
 use etendue::settings::{Overrides, Settings};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
-use random_scene::scenes;
+use random_scene::{Implicits, scenes};
 use std::sync::atomic::AtomicBool;
 
 /// What is wrong with `spp` samples of a few pixels of the picture's corner and middle.
@@ -281,7 +281,7 @@ proptest! {
     #![proptest_config(seeded(32))]
 
     #[test]
-    fn random_scenes_of_every_magnitude(scene in scenes(false)) {
+    fn random_scenes_of_every_magnitude(scene in scenes(Implicits::None)) {
         let size = scene.camera.resolution;
         if let Some(fault) = both(&scene, size, Access::Buffers) {
             prop_assert!(false, "{}", fault);
@@ -293,7 +293,19 @@ proptest! {
     #![proptest_config(seeded(16))]
 
     #[test]
-    fn random_formulas_of_every_magnitude(scene in scenes(true)) {
+    fn random_formulas_of_every_magnitude(scene in scenes(Implicits::Formulas)) {
+        let size = scene.camera.resolution;
+        if let Some(fault) = both(&scene, size, Access::Buffers) {
+            prop_assert!(false, "{}", fault);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(seeded(16))]
+
+    #[test]
+    fn random_volumes_of_every_magnitude(scene in scenes(Implicits::Volumes)) {
         let size = scene.camera.resolution;
         if let Some(fault) = both(&scene, size, Access::Buffers) {
             prop_assert!(false, "{}", fault);

@@ -9,7 +9,7 @@ use etendue::scene::{Bsdf, Place, Scene, Shape};
 use glam::DVec3;
 use proptest::collection::vec;
 use proptest::prelude::*;
-use random_scene::scenes;
+use random_scene::{Implicits, scenes};
 use std::fmt::Write;
 use std::io::Write as _;
 use std::path::Path;
@@ -451,7 +451,7 @@ proptest! {
     }
 
     #[test]
-    fn valid_scenes_are_read_as_written(scene in scenes(true)) {
+    fn valid_scenes_are_read_as_written(scene in scenes(Implicits::Formulas)) {
         let text = to_toml(&scene).expect("strings take all text");
         match parse_str(&scene.path, &text) {
             Ok(read) => {
@@ -467,7 +467,7 @@ proptest! {
     }
 
     #[test]
-    fn damaged_files_never_panic(scene in scenes(true), damages in vec(damage(), 1..6)) {
+    fn damaged_files_never_panic(scene in scenes(Implicits::Formulas), damages in vec(damage(), 1..6)) {
         let mut bytes = to_toml(&scene).expect("strings take all text").into_bytes();
         apply(&damages, &mut bytes);
         check(&String::from_utf8_lossy(&bytes))?;

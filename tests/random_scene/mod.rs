@@ -1,6 +1,9 @@
 //! Random scenes of every size that the format allows.
 
-use etendue::implicit::{Clip, Implicit};
+#![allow(dead_code, reason = "every test binary uses its own part of it")]
+
+use etendue::Numbers;
+use etendue::implicit::{Clip, Grid, Implicit, Volume};
 use etendue::scene::{Bsdf, Camera, Light, Material, Place, Primitive, RenderHints, Scene, Shape};
 use glam::{DMat3, DVec3};
 use proptest::collection::vec;
@@ -102,7 +105,7 @@ fn clip() -> impl Strategy<Value = Clip> {
 }
 
 /// Well-known surfaces, and formulas that nobody would write.
-fn implicit() -> impl Strategy<Value = Shape> {
+fn formula_surface() -> impl Strategy<Value = Shape> {
     let known = prop::sample::select(vec![
         "x^2 + y^2 + z^2 - a^2",
         "(x^2 + y^2 + z^2 + 1 - a^2/16)^2 - 4 (x^2 + y^2)",
@@ -123,6 +126,37 @@ fn implicit() -> impl Strategy<Value = Shape> {
             shape.scale = scale;
             shape.rotation = DMat3::from_axis_angle(axis, angle.to_radians());
             shape.clip = clip;
+            shape.closed = closed;
+            Some(Shape::Implicit(Arc::new(shape)))
+        },
+    )
+}
+
+/// Volumes of a few points, whose numbers have any magnitude, and of which many are equal.
+fn volume() -> impl Strategy<Value = Shape> {
+    let number = prop_oneof![Just(0.0), -1.0..1.0, coordinate().prop_map(|x| x * 1e200)];
+    let numbers = [2..5usize, 2..5usize, 2..5usize].prop_flat_map(move |size| {
+        let count = size.iter().product::<usize>();
+        let kinds = prop_oneof![
+            vec(any::<u8>(), count).prop_map(Numbers::U8),
+            vec(any::<u16>(), count).prop_map(Numbers::U16),
+            vec(-1.0..1.0f32, count).prop_map(Numbers::F32),
+            vec(number.clone(), count).prop_map(Numbers::F64),
+        ];
+        (Just(size), kinds)
+    });
+    let spacing = [radius(), radius(), radius()].prop_map(DVec3::from_array);
+    let place = (point(), unit(), -180.0..180.0f64);
+    let ways = (any::<bool>(), any::<bool>(), any::<bool>());
+    (numbers, 0.0..=1.0f64, spacing, place, ways).prop_filter_map(
+        "numbers that stay in range",
+        |((size, numbers), share, spacing, (center, axis, angle), (above, closed, smooth))| {
+            let mut grid = Grid::new(Volume::new(size, numbers).ok()?, spacing);
+            (grid.above, grid.smooth) = (above, smooth);
+            let [low, high] = grid.volume.range();
+            let mut shape = Implicit::of_volume(grid, low * (1.0 - share) + high * share);
+            shape.center = center;
+            shape.rotation = DMat3::from_axis_angle(axis, angle.to_radians());
             shape.closed = closed;
             Some(Shape::Implicit(Arc::new(shape)))
         },
@@ -158,18 +192,30 @@ fn camera() -> impl Strategy<Value = Camera> {
         })
 }
 
-/// Valid scenes, with one to three formulas if asked; the names of materials are such that TOML must quote some.
-pub fn scenes(formulas: bool) -> BoxedStrategy<Scene> {
-    if !formulas {
-        return scenes_of(shape()).boxed();
-    }
-    let shapes = prop_oneof![2 => shape(), 1 => implicit()];
-    let with_one_more = (scenes_of(shapes), implicit()).prop_map(|(mut scene, shape)| {
+/// What is in a random scene beside spheres, planes, disks and cylinders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Implicits {
+    None,
+    /// One to three.
+    Formulas,
+    /// One to three.
+    Volumes,
+}
+
+/// Valid scenes; the names of materials are such that TOML must quote some.
+pub fn scenes(implicits: Implicits) -> BoxedStrategy<Scene> {
+    let implicit = match implicits {
+        Implicits::None => return scenes_of(shape()).boxed(),
+        Implicits::Formulas => formula_surface().boxed(),
+        Implicits::Volumes => volume().boxed(),
+    };
+    let shapes = prop_oneof![2 => shape(), 1 => implicit.clone()];
+    let with_one_more = (scenes_of(shapes), implicit).prop_map(|(mut scene, shape)| {
         let mut count = 0;
         scene.primitives.retain(|p| {
-            let is_formula = matches!(p.shape, Shape::Implicit(_));
-            count += usize::from(is_formula);
-            count < 3 || !is_formula
+            let is_implicit = matches!(p.shape, Shape::Implicit(_));
+            count += usize::from(is_implicit);
+            count < 3 || !is_implicit
         });
         let glass = |m: usize| matches!(scene.materials[m].bsdf, Bsdf::Dielectric { .. });
         let solid = matches!(&shape, Shape::Implicit(s) if s.closed);

@@ -3,7 +3,7 @@
 use super::super::literal::{float, vector};
 use super::super::modules::{IMPLICIT_GRID, IMPLICIT_SMOOTH};
 use super::super::preprocess::fill;
-use super::implicit::{Sides, grids, name};
+use super::implicit::{Sides, axes, grids, name};
 use crate::files::npy::Numbers;
 use crate::implicit::hierarchy::BELOW;
 use crate::implicit::{Grid, Implicit};
@@ -56,19 +56,11 @@ pub(super) fn surface(k: usize, number: usize, p: &WorldPrimitive, implicit: &Im
         binding + 1
     );
 
-    let axes = [
-        implicit.rotation.x_axis,
-        implicit.rotation.y_axis,
-        implicit.rotation.z_axis,
-    ];
     // A cell's sides in the scene.
     let sides = (grid.spacing * implicit.scale).to_array();
     let least = sides.into_iter().fold(f64::MAX, f64::min);
-    let each =
-        |f: fn(DVec3, f64, f64) -> DVec3| [0, 1, 2].map(|k| vector(f(axes[k], sides[k], least)));
-    let rows = each(|axis, side, _| axis / side);
-    let columns = each(|axis, side, _| axis * side);
-    let normals = each(|axis, side, least| axis * (least / side));
+    let axes = axes(implicit, DVec3::from_array(sides));
+    let normals = [0, 1, 2].map(|k| vector(implicit.rotation.col(k) * (least / sides[k])));
     let metric = DVec3::from_array(sides.map(|side| (least / side).powi(2)));
     // Places are rounded in the scene, and again in cells.
     let (middle, radius) = implicit.ball();
@@ -81,12 +73,6 @@ pub(super) fn surface(k: usize, number: usize, p: &WorldPrimitive, implicit: &Im
         ("name", &name),
         ("height", &height),
         ("center", &vector(implicit.center)),
-        ("row_x", &rows[0]),
-        ("row_y", &rows[1]),
-        ("row_z", &rows[2]),
-        ("column_x", &columns[0]),
-        ("column_y", &columns[1]),
-        ("column_z", &columns[2]),
         ("normal_x", &normals[0]),
         ("normal_y", &normals[1]),
         ("normal_z", &normals[2]),
@@ -106,10 +92,12 @@ pub(super) fn surface(k: usize, number: usize, p: &WorldPrimitive, implicit: &Im
         ("newton", "2u"),
         ("reach", &float(REACH)),
     ];
-    s += &fill(IMPLICIT_GRID.text, values);
+    let axes = axes.each_ref().map(|(name, value)| (*name, value.as_str()));
+    let values = [values, &axes].concat();
+    s += &fill(IMPLICIT_GRID.text, &values);
     if grid.smooth {
         s.push('\n');
-        s += &fill(IMPLICIT_SMOOTH.text, values);
+        s += &fill(IMPLICIT_SMOOTH.text, &values);
     }
     s + "\n"
 }

@@ -8,6 +8,7 @@ use super::grid;
 use crate::implicit::formula::{Formula, Id, Node};
 use crate::implicit::{Clip, Implicit};
 use crate::world::{Geometry, Side, World, WorldPrimitive, key};
+use glam::DVec3;
 use std::fmt::Write as _;
 
 /// The most parts of a ray that a kernel looks at.
@@ -287,16 +288,25 @@ impl Sides {
     }
 }
 
+/// The rows that take a vector of the scene to the surface's own axes, along which it has these units, and the columns that take it back.
+pub(super) fn axes(implicit: &Implicit, units: DVec3) -> [(&'static str, String); 6] {
+    let axis = |k| implicit.rotation.col(k);
+    let row = |k| vector(axis(k) / units[k]);
+    let column = |k| vector(axis(k) * units[k]);
+    [
+        ("row_x", row(0)),
+        ("row_y", row(1)),
+        ("row_z", row(2)),
+        ("column_x", column(0)),
+        ("column_y", column(1)),
+        ("column_z", column(2)),
+    ]
+}
+
 /// The functions of one surface, whose formula has number `k`.
 fn surface(number: usize, p: &WorldPrimitive, implicit: &Implicit, k: usize) -> String {
     let name = name(number);
-    let axes = [
-        implicit.rotation.x_axis,
-        implicit.rotation.y_axis,
-        implicit.rotation.z_axis,
-    ];
-    let rows = axes.map(|axis| vector(axis / implicit.scale));
-    let columns = axes.map(|axis| vector(axis * implicit.scale));
+    let axes = axes(implicit, DVec3::splat(implicit.scale));
     let (middle, half) = implicit.clip.extent();
     let (span, onto) = match implicit.clip {
         Clip::Box { min, max } => (
@@ -323,36 +333,29 @@ fn surface(number: usize, p: &WorldPrimitive, implicit: &Implicit, k: usize) -> 
         format!("sloped_{k}"),
     );
     let center = vector(implicit.center);
-    let filled = fill(
-        IMPLICIT_SURFACE.text,
-        &[
-            ("name", &name),
-            ("formula", &text),
-            ("sloped", &sloped),
-            ("center", &center),
-            ("row_x", &rows[0]),
-            ("row_y", &rows[1]),
-            ("row_z", &rows[2]),
-            ("column_x", &columns[0]),
-            ("column_y", &columns[1]),
-            ("column_z", &columns[2]),
-            ("span", &span),
-            ("onto", &onto),
-            ("inside", &sides.inside),
-            ("asked", &sides.asked),
-            ("solid", sides.solid),
-            ("sign", sides.sign),
-            ("key", &key),
-            ("least", &least),
-            ("tolerance", &tolerance),
-            ("zone", &zone),
-            ("first_step", &first_step),
-            ("most_turns", &most),
-            ("newton", "2u"),
-            ("reach", &reach),
-            ("result", &sides.result),
-            ("slack", &vector(slack)),
-        ],
-    );
-    filled + "\n"
+    let values: &[(&str, &str)] = &[
+        ("name", &name),
+        ("formula", &text),
+        ("sloped", &sloped),
+        ("center", &center),
+        ("span", &span),
+        ("onto", &onto),
+        ("inside", &sides.inside),
+        ("asked", &sides.asked),
+        ("solid", sides.solid),
+        ("sign", sides.sign),
+        ("key", &key),
+        ("least", &least),
+        ("tolerance", &tolerance),
+        ("zone", &zone),
+        ("first_step", &first_step),
+        ("most_turns", &most),
+        ("newton", "2u"),
+        ("reach", &reach),
+        ("result", &sides.result),
+        ("slack", &vector(slack)),
+    ];
+    let axes = axes.each_ref().map(|(name, value)| (*name, value.as_str()));
+    let values = [values, &axes].concat();
+    fill(IMPLICIT_SURFACE.text, &values) + "\n"
 }

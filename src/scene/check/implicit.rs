@@ -2,8 +2,8 @@
 
 use super::geometry::directions;
 use super::{Warnings, called};
+use crate::implicit::Plateaus;
 use crate::implicit::arithmetic::Strict;
-use crate::implicit::volume::Plateaus;
 use crate::implicit::{Clip, Grid, Implicit};
 use crate::scene::source::quoted;
 use crate::scene::{Primitive, Scene, Shape};
