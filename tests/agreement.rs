@@ -6,7 +6,7 @@
 
 mod common;
 
-use common::{block_means, cpu, film, gpu, read, scene, scene_files, settings, worst_t};
+use common::{block_means_of_seeds, cpu, gpu, read, scene, scene_files, settings, worst_t};
 use etendue::engine::Engine;
 use etendue::gpu::{Choice, Gpu, GpuEngine};
 use etendue::kernel::{Access, compose};
@@ -44,20 +44,18 @@ fn runs_with(
     first_seed: u32,
     light_paths: bool,
 ) -> Vec<Vec<[f64; 3]>> {
-    let runs = (0..RUNS).map(|k| {
-        let mut settings = settings(s, SIZE, first_seed + k);
-        settings.light_paths = light_paths;
-        block_means(&film(&mut gpu(s, &settings, access), &settings, spp), 6)
-    });
-    runs.collect()
+    let mut settings = settings(s, SIZE, first_seed);
+    settings.light_paths = light_paths;
+    seeds_of(&mut gpu(s, &settings, access), &settings, spp)
 }
 
 fn cpu_runs(s: &Scene, spp: u64, estimator: Estimator) -> Vec<Vec<[f64; 3]>> {
-    let runs = (0..RUNS).map(|seed| {
-        let settings = settings(s, SIZE, 1000 + seed);
-        block_means(&film(&mut cpu(s, &settings, estimator), &settings, spp), 6)
-    });
-    runs.collect()
+    let settings = settings(s, SIZE, 1000);
+    seeds_of(&mut cpu(s, &settings, estimator), &settings, spp)
+}
+
+fn seeds_of(engine: &mut dyn Engine, settings: &Settings, spp: u64) -> Vec<Vec<[f64; 3]>> {
+    block_means_of_seeds(engine, settings, RUNS, spp, 6)
 }
 
 fn agree(s: &Scene) -> Result<(), Failed> {
@@ -134,18 +132,15 @@ fn access_agrees(s: &Scene) -> Result<(), Failed> {
 
 /// Of the parts of the light each alone: extra camera rays keep what the path would have kept.
 fn part_agrees(s: &Scene, light: LightParts) -> Result<(), Failed> {
-    let runs = |spp: u64, first_seed: u32, engine: fn(&Scene, &Settings) -> Box<dyn Engine>| {
-        let runs = (0..RUNS).map(|k| {
-            let mut settings = settings(s, SIZE, first_seed + k);
-            settings.light = light;
-            block_means(&film(engine(s, &settings).as_mut(), &settings, spp), 6)
-        });
-        runs.collect::<Vec<_>>()
+    let settings = |seed: u32| Settings {
+        light,
+        ..settings(s, SIZE, seed)
     };
-    let reference = runs(64, 1000, |s, settings| {
-        Box::new(cpu(s, settings, Estimator::LightSampling))
-    });
-    let found = runs(256, 0, |s, settings| Box::new(gpu(s, settings, None)));
+    let of_reference = settings(1000);
+    let mut reference = cpu(s, &of_reference, Estimator::LightSampling);
+    let reference = seeds_of(&mut reference, &of_reference, 64);
+    let settings = settings(0);
+    let found = seeds_of(&mut gpu(s, &settings, None), &settings, 256);
     compare("GPU against reference", &found, &reference)
 }
 
@@ -164,19 +159,16 @@ fn faults_are_seen(s: &Scene) -> Result<(), Failed> {
             "material.color, crosses);",
         ),
     ] {
-        let runs = (0..RUNS).map(|k| {
-            let settings = settings(s, SIZE, k);
-            let world = World::new(s, settings.size);
-            let mut kernel = compose(&world, &settings, None);
-            assert!(kernel.wgsl.contains(right), "{right}");
-            kernel.wgsl = kernel.wgsl.replace(right, wrong);
-            let gpu = Gpu::open(&Choice::default()).expect("an adapter");
-            // SAFETY: it is what `compose` made but for numbers that are no indices and end no loop.
-            let engine = unsafe { GpuEngine::with_kernel(gpu, &world, &settings, kernel) };
-            let mut engine = engine.expect("an engine");
-            block_means(&film(&mut engine, &settings, 256), 6)
-        });
-        if compare("", &runs.collect::<Vec<_>>(), &reference).is_ok() {
+        let settings = settings(s, SIZE, 0);
+        let world = World::new(s, settings.size);
+        let mut kernel = compose(&world, &settings, None);
+        assert!(kernel.wgsl.contains(right), "{right}");
+        kernel.wgsl = kernel.wgsl.replace(right, wrong);
+        let gpu = Gpu::open(&Choice::default()).expect("an adapter");
+        // SAFETY: it is what `compose` made but for numbers that are no indices and end no loop.
+        let engine = unsafe { GpuEngine::with_kernel(gpu, &world, &settings, kernel) };
+        let runs = seeds_of(&mut engine.expect("an engine"), &settings, 256);
+        if compare("", &runs, &reference).is_ok() {
             return Err(format!("\"{wrong}\" in the place of \"{right}\" is not seen").into());
         }
     }

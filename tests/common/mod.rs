@@ -110,6 +110,22 @@ pub fn add(engine: &mut dyn Engine, film: &mut Film, samples: Range<u64>) {
     }
 }
 
+/// [`block_means`] of pictures of `count` seeds, from that of `settings` on. A kernel is compiled once for all.
+pub fn block_means_of_seeds(
+    engine: &mut dyn Engine,
+    settings: &Settings,
+    count: u32,
+    spp: u64,
+    block: u32,
+) -> Vec<Vec<[f64; 3]>> {
+    let seeds = settings.seed..settings.seed + count;
+    let means = seeds.map(|seed| {
+        engine.reseed(seed);
+        block_means(&film(engine, settings, spp), block)
+    });
+    means.collect()
+}
+
 /// Means of square blocks of pixels, all channels, then the mean of the whole picture.
 pub fn block_means(film: &Film, block: u32) -> Vec<[f64; 3]> {
     let [w, h] = film.size;

@@ -1,6 +1,6 @@
 //! Pictures of formulas against those of the surfaces that they describe.
 
-use crate::common::{block_means, cpu, film, gpu, scene, settings, worst_t};
+use crate::common::{block_means_of_seeds, cpu, gpu, scene, settings, worst_t};
 use etendue::files::npy::header;
 use etendue::gpu::probe::Uniform;
 use etendue::reference::Estimator;
@@ -32,11 +32,8 @@ fn room(material: &str, thing: &str) -> String {
 
 fn runs(text: &str, first_seed: u32) -> Vec<Vec<[f64; 3]>> {
     let s = scene(text);
-    let runs = (0..RUNS).map(|k| {
-        let settings = settings(&s, SIZE, first_seed + k);
-        block_means(&film(&mut gpu(&s, &settings, None), &settings, 128), 6)
-    });
-    runs.collect()
+    let settings = settings(&s, SIZE, first_seed);
+    block_means_of_seeds(&mut gpu(&s, &settings, None), &settings, RUNS, 128, 6)
 }
 
 const MATERIALS: [&str; 4] = [
@@ -180,16 +177,14 @@ fn lump_file() -> Vec<u8> {
 /// Means of blocks of pictures by the kernel, and by the reference.
 fn both(folder: &Path, text: &str) -> [Runs; 2] {
     let scene = parse_str(&folder.join("test.toml"), text).unwrap_or_else(|e| panic!("{e:?}"));
-    let kernel = (0..RUNS).map(|k| {
-        let settings = settings(&scene, SMALL, k);
-        block_means(&film(&mut gpu(&scene, &settings, None), &settings, 256), 6)
-    });
-    let reference = (0..RUNS).map(|k| {
-        let settings = settings(&scene, SMALL, 500 + k);
-        let mut engine = cpu(&scene, &settings, Estimator::LightSampling);
-        block_means(&film(&mut engine, &settings, 64), 6)
-    });
-    [kernel.collect(), reference.collect()]
+    let of_kernel = settings(&scene, SMALL, 0);
+    let of_reference = settings(&scene, SMALL, 500);
+    let mut kernel = gpu(&scene, &of_kernel, None);
+    let mut reference = cpu(&scene, &of_reference, Estimator::LightSampling);
+    [
+        block_means_of_seeds(&mut kernel, &of_kernel, RUNS, 256, 6),
+        block_means_of_seeds(&mut reference, &of_reference, RUNS, 64, 6),
+    ]
 }
 
 /// Volumes where other surfaces stand in trees, in crowds of more things than are met one by one, and in glass: as bright as the reference
