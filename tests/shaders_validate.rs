@@ -3,10 +3,15 @@
 mod common;
 
 use common::scene;
+use etendue::Numbers;
+use etendue::implicit::{Grid, Implicit, Volume};
 use etendue::kernel::{Access, compose};
+use etendue::scene::{Primitive, Scene, Shape};
 use etendue::settings::{Integrator, LightParts, Overrides, Settings};
 use etendue::world::World;
+use glam::DVec3;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
+use std::sync::Arc;
 
 const MATERIALS: [(&str, &str); 4] = [
     (
@@ -91,6 +96,28 @@ fn validate(wgsl: &str, what: &str) {
         .unwrap_or_else(|e| panic!("{what}: {}", e.emit_to_string(wgsl)));
 }
 
+const ACCESSES: [Access; 3] = [Access::Baked, Access::Buffers, Access::Tree];
+
+/// Validates the kernels of a scene, of paths and of light paths, for every access; their number.
+fn validate_all(scene: &Scene, flags: &Overrides, what: &str) -> usize {
+    let settings = Settings::resolve(scene, flags);
+    let world = World::new(scene, settings.size);
+    let mut count = 0;
+    for access in ACCESSES {
+        let kernel = compose(&world, &settings, Some(access));
+        for (name, wgsl) in [
+            ("path", Some(&kernel.wgsl)),
+            ("light", kernel.light.as_ref().map(|l| &l.wgsl)),
+        ] {
+            if let Some(wgsl) = wgsl {
+                validate(wgsl, &format!("{name} {access:?} {flags:?}\n{what}"));
+                count += 1;
+            }
+        }
+    }
+    count
+}
+
 #[test]
 fn every_combination_of_primitives_and_materials_is_valid() {
     let mut count = 0;
@@ -100,26 +127,72 @@ fn every_combination_of_primitives_and_materials_is_valid() {
             let Some(text) = text(shapes, materials, lights, (shapes ^ materials) & 4 == 4) else {
                 continue;
             };
-            let scene = scene(&text);
-            let settings = Settings::resolve(&scene, &Overrides::default());
-            let world = World::new(&scene, settings.size);
-            for access in [Access::Baked, Access::Buffers, Access::Tree] {
-                validate(
-                    &compose(&world, &settings, Some(access)).wgsl,
-                    &format!("{access:?}\n{text}"),
-                );
-                count += 1;
-            }
+            count += validate_all(&scene(&text), &Overrides::default(), &text);
         }
     }
-    assert!(count > 900, "only {count} kernels");
+    assert!(count > 1400, "only {count} kernels");
+}
+
+/// The surface of a formula, that of a volume, and one with smooth normals.
+fn implicits() -> [Implicit; 3] {
+    let formula = Implicit::new("x^2 + y^4 + sin(z) - 0.3", &[]).expect("a formula");
+    let grid = Grid::new(
+        Volume::new([2, 2, 2], Numbers::U8((0..8).collect())).expect("a volume"),
+        DVec3::ONE,
+    );
+    let smooth = Grid {
+        smooth: true,
+        ..grid.clone()
+    };
+    [
+        formula,
+        Implicit::of_volume(grid, 2.5),
+        Implicit::of_volume(smooth, 2.5),
+    ]
+}
+
+/// A scene with the implicit surfaces and the materials whose bits are set, every surface with every material, alone or beside others.
+fn with_implicits(surfaces: usize, materials: usize, alone: bool) -> Scene {
+    let mut scene = scene(&text(EVERY_SHAPE, materials, 2, false).expect("has primitives"));
+    if alone {
+        scene.primitives.clear();
+    }
+    for (_, implicit) in implicits()
+        .into_iter()
+        .enumerate()
+        .filter(|(k, _)| surfaces >> k & 1 == 1)
+    {
+        for material in 0..scene.materials.len() {
+            scene.primitives.push(Primitive {
+                shape: Shape::Implicit(Arc::new(implicit.clone())),
+                material,
+                line: 0,
+                column: 0,
+            });
+        }
+    }
+    scene
+}
+
+#[test]
+fn implicit_surfaces_of_every_material_are_valid() {
+    for surfaces in 1..8 {
+        for materials in 1..1 << MATERIALS.len() {
+            let alone = (surfaces + materials) % 2 == 1;
+            let scene = with_implicits(surfaces, materials, alone);
+            let what = format!("surfaces {surfaces}, materials {materials}, alone: {alone}");
+            validate_all(&scene, &Overrides::default(), &what);
+        }
+    }
 }
 
 #[test]
 fn every_mode_is_valid() {
     let everything = scene(&text(EVERY_SHAPE, EVERY_MATERIAL, 3, false).expect("has primitives"));
     let only_mirrors = scene(&text(1, 2, 1, false).expect("has primitives"));
-    for scene in [&everything, &only_mirrors] {
+    let smooth_mirrors = with_implicits(4, 2, true);
+    let smooth_gloss = with_implicits(4, 8, true);
+    for scene in [&everything, &only_mirrors, &smooth_mirrors, &smooth_gloss] {
         for light in 1..8 {
             for integrator in [Integrator::Path, Integrator::Whitted] {
                 for shadow_rays in [1, 4] {
@@ -136,14 +209,7 @@ fn every_mode_is_valid() {
                             integrator: Some(integrator),
                             ..Overrides::default()
                         };
-                        let settings = Settings::resolve(scene, &flags);
-                        let world = World::new(scene, settings.size);
-                        for access in [Access::Baked, Access::Buffers, Access::Tree] {
-                            validate(
-                                &compose(&world, &settings, Some(access)).wgsl,
-                                &format!("{access:?} {flags:?}"),
-                            );
-                        }
+                        validate_all(scene, &flags, "");
                     }
                 }
             }
@@ -159,7 +225,7 @@ fn a_kernel_holds_only_what_its_scene_needs() {
         compose(&World::new(&scene, settings.size), &settings, access).wgsl
     };
     let plane = kernel(text(2, 1, 1, false), None);
-    let everything = [Access::Baked, Access::Buffers, Access::Tree]
+    let everything = ACCESSES
         .map(|access| kernel(text(EVERY_SHAPE, EVERY_MATERIAL, 3, false), Some(access)))
         .concat();
     for unneeded in [

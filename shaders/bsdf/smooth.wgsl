@@ -8,9 +8,3 @@ fn sample_bsdf(x: ptr<function, Interaction>, u: Draws) -> Scattered {
     scattered.weight = select(vec3f(0.0), scattered.weight, right);
     return scattered;
 }
-
-fn evaluate_bsdf(x: ptr<function, Interaction>, wi: vec3f) -> BsdfValue {
-    var value = evaluate_material(x, wi);
-    value.f_cos = select(vec3f(0.0), value.f_cos, dot(x.geometric, wi) > 0.0);
-    return value;
-}

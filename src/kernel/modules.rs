@@ -63,6 +63,7 @@ modules! {
     DIELECTRIC = "bsdf/dielectric",
     PHONG = "bsdf/phong",
     SMOOTH = "bsdf/smooth",
+    SMOOTH_EVALUATED = "bsdf/smooth_evaluated",
     DISK_LIGHT = "light/disk",
     LIGHT_WEIGHT = "light/weight",
     RECEIVER_MATT = "light/receiver_matt",
@@ -212,6 +213,7 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
     }
     modules.extend(f.materials().map(of_material));
     modules.extend(f.has_smooth_normals.then_some(SMOOTH));
+    modules.extend((f.has_smooth_normals && f.evaluates).then_some(SMOOTH_EVALUATED));
     modules.push(DISK_LIGHT);
     modules.push(if glossy {
         RECEIVER_GLOSSY

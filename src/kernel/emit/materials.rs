@@ -6,7 +6,7 @@ use crate::scene::MaterialKind;
 use std::fmt::Write as _;
 
 /// `sample_bsdf`, and `evaluate_bsdf` if it is called. With smooth normals they are `sample_material` and `evaluate_material`, which
-/// `shaders/bsdf/smooth.wgsl` calls.
+/// `shaders/bsdf/smooth.wgsl` and `smooth_evaluated.wgsl` call.
 pub(in crate::kernel) fn dispatch(features: &Features) -> String {
     let mut s = String::new();
     let what = if features.has_smooth_normals {
