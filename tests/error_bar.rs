@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{add, film, generated, gpu, named_scene, settings};
+use common::{add, film, generated, gpu, named_scene, scene, settings};
 use etendue::engine::EngineError;
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
@@ -92,6 +92,17 @@ fn glossy() {
 #[test]
 fn caustic() {
     check("caustic", [24, 18]);
+}
+
+#[test]
+fn cylinders() {
+    check("cylinders", [24, 18]);
+}
+
+#[test]
+fn room_of_mirrors() {
+    let room = scene(include_str!("scenes/mirror_balls.toml"));
+    check_scene("mirror_balls", &room, [24, 18]);
 }
 
 #[test]
