@@ -144,8 +144,10 @@ fn root_after_start(b: vec4f, noise: f32) -> f32 {
     let falls = q.x <= 0.0;
     let begin = vec2f(select(first, 0.0, falls), select(2.0, second, falls));
     let end = vec2f(fmin(select(second, first, falls), 1.0), 1.0);
+    // The last part may be deepest where the cell ends.
     let middle = 0.5 * (begin + end);
-    let depth = -middle * (vec2f(q.x) + middle * (vec2f(2.0 * h) + middle * k));
-    let deep = (begin < vec2f(1.0)) & (depth > vec2f(noise));
+    let within = -middle * (vec2f(q.x) + middle * (vec2f(2.0 * h) + middle * k));
+    let at_end = -end * (vec2f(q.x) + end * (vec2f(2.0 * h) + end * k));
+    let deep = (begin < vec2f(1.0)) & (max(within, at_end) > vec2f(noise));
     return select(select(2.0, begin.y, deep.y), begin.x, deep.x);
 }

@@ -1,4 +1,4 @@
-//! The first root of cubics in Bernstein's form, as the kernels find it in a cell, against f64.
+//! Roots of cubics in Bernstein's form, as the kernels find them in a cell, against f64: the first, and that after a root at the start.
 
 use super::rays::{GPU, settings_of};
 use super::volumes::{distances, scene_of};
@@ -6,17 +6,18 @@ use etendue::gpu::probe::{Probe, Uniform, Values};
 use etendue::kernel::{Access, scene_probe_source};
 use etendue::world::World;
 
-const BODY: &str = "y[0] = first_root(vec4f(x[0], x[1], x[2], x[3]));";
+const FIRST: &str = "y[0] = first_root(vec4f(x[0], x[1], x[2], x[3]));";
+const AFTER_START: &str = "y[0] = root_after_start(vec4f(x[0], x[1], x[2], x[3]), x[4]);";
 
-/// The kernel's answers, its text changed by `edit` before.
-fn answers(inputs: &[Values], edit: impl FnOnce(String) -> String) -> Vec<Values> {
+/// The answers of a kernel with this body, its text changed by `edit` before.
+fn answers(body: &str, inputs: &[Values], edit: impl FnOnce(String) -> String) -> Vec<Values> {
     let world = World::new(&scene_of(&distances(4, 0.5), "white"), [8, 8]);
     let access = Access::Baked;
     let source = edit(scene_probe_source(
         &world,
         &settings_of(&world),
         access,
-        BODY,
+        body,
     ));
     let probe = Probe::compile_for(&GPU, &source, Some(access), Some(&world))
         .unwrap_or_else(|e| panic!("{e}\n{source}"));
@@ -108,7 +109,7 @@ fn worst(kind: usize, count: usize, edit: impl FnOnce(String) -> String) -> ([f6
         }
     }
     let (mut off, mut deep, mut roots) = (0.0f64, 0.0f64, 0);
-    for (x, y) in inputs.iter().zip(answers(&inputs, edit)) {
+    for (x, y) in inputs.iter().zip(answers(FIRST, &inputs, edit)) {
         let b = [0, 1, 2, 3].map(|k| f64::from(x[k]));
         let most = b.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
         let u = f64::from(y[0]);
@@ -157,4 +158,47 @@ fn faults_are_seen() {
         println!("{old}: {off:.2e} off, {deep:.2e} deep");
         assert!(off.max(deep) > 3.0 * ROUNDING, "{old}: {off} {deep}");
     }
+}
+
+/// Cubics that are 0 at the start: how deep they dip below 0 before the root that the kernel finds, over what it takes for noise.
+fn deepest_after_start(count: usize, edit: impl FnOnce(String) -> String) -> f64 {
+    let mut r = Uniform(31);
+    let inputs: Vec<Values> = (0..count)
+        .map(|k| {
+            let b = cubic(k % 4, &mut r);
+            let sign = if r.next() < 0.5 { -1.0 } else { 1.0 };
+            let mut x = Values::default();
+            for k in 1..4 {
+                x[k] = (sign * (b[k] - b[0])) as f32;
+            }
+            x[4] = 10f64.powf(r.between(-5.0, -1.0)) as f32;
+            x
+        })
+        .collect();
+    let mut worst = 0.0f64;
+    let mut roots = 0;
+    for (x, y) in inputs.iter().zip(answers(AFTER_START, &inputs, edit)) {
+        let b = [0, 1, 2, 3].map(|k| f64::from(x[k]));
+        let (noise, u) = (f64::from(x[4]), f64::from(y[0]));
+        assert!((0.0..=1.0).contains(&u) || u == 2.0, "{b:?}: {u}");
+        roots += usize::from(u <= 1.0);
+        worst = worst.max(deepest(&b, u.min(1.0)) / noise);
+    }
+    assert!(roots > count / 10, "{roots} roots");
+    worst
+}
+
+#[test]
+fn no_dip_after_the_start_is_passed_over() {
+    // A dip is measured in its middle and at its end. Elsewhere it is hardly deeper.
+    let deep = deepest_after_start(300_000, |source| source);
+    println!("{deep:.2} times the noise deep");
+    assert!(deep < 1.5, "{deep}");
+    // A ray that fell to the end of the cell, and was only looked at halfway.
+    let deep = deepest_after_start(100_000, |source| {
+        let old = "max(within, at_end)";
+        assert_eq!(source.matches(old).count(), 1, "{old}");
+        source.replace(old, "within")
+    });
+    assert!(deep > 10.0, "{deep}");
 }
