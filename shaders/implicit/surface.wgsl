@@ -40,6 +40,8 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
     var met = beyond;
     var t = 0.0;
     var turns = 0u;
+    // The least rounding so far, or more.
+    var noise = first.z;
     while asked && !met && a < end && turns < $most_turns && trips_left > 0u {
         trips_left -= 1u;
         turns += 1u;
@@ -48,6 +50,7 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         let half = 0.5 * length;
         let middle = a + half;
         let f = $formula(q + middle * w, half * w, $slack);
+        noise = fmin(noise, f.z);
         let height = sign * f.x;
         let rise = sign * f.y;
         let free = height - abs(rise) > f.z;
@@ -60,19 +63,21 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         let must = select(b, fmax(middle + half * (height + f.z) * inverse, may), crossed);
         clear = clear || free_at_a;
         // It is good enough, or rounding alone is left.
-        let found = crossed && clear && (must - may <= $tolerance || f.z <= 2.0 * first.z);
+        let found = crossed && clear && (must - may <= $tolerance || f.z <= 2.0 * noise);
         // Along the surface rounding alone would be looked at, again and again.
-        let blurred = !clear && f.z <= 4.0 * first.z;
-        let smallest = length <= select($least, fmax($least, 0.5 * a), blurred);
+        let blurred = !clear && f.z <= 4.0 * noise;
+        // A ray may run beside the surface, as near as rounding, for hundreds of least parts. So that part grows in time, to 512 times.
+        let least = $least * exp2(clamp(0.25 * (f32(turns) - 48.0), 0.0, 9.0));
+        let smallest = length <= select(least, fmax(least, 0.5 * a), blurred);
         let ends_here = crossed || (clear && rise <= 0.0);
         met = !free && (found || (smallest && ends_here));
         t = select(may, 0.5 * (may + must), found);
 
         // The next part: as long as should be free, by what the formula bends here; a little longer where a root is near.
         let skips = free || (smallest && !ends_here);
-        let bend = fmax(f.z - first.z, TINY) / (half * half);
+        let bend = fmax(f.z - noise, TINY) / (half * half);
         let down = fmax(-rise, 0.0) / half;
-        let left = fmax(select(0.5 * (f.z - first.z), height + rise - first.z, skips), first.z);
+        let left = fmax(select(0.5 * (f.z - noise), height + rise - noise, skips), noise);
         let bent = bend * left;
         let level = down * down;
         let next = left * select(1.4 / (down + sqrt(level + bent)), 1.8 / fmax(down, TINY), bent < 0.3 * level);
@@ -82,12 +87,13 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
             fmin(must - may, 0.5 * length),
             crossed
         );
-        stride = fmax(select(shorter, fmin(next, 16.0 * length), skips), 0.5 * $least);
+        stride = fmax(select(shorter, fmin(next, 16.0 * length), skips), 0.5 * least);
         a = select(may, b, skips);
     }
     // Whoever has no turns left meets what there may be.
-    met = asked && (met || (a < end && turns >= $most_turns));
-    let surface = nearer(hit, met, begin + t, $key + select(0u, 1u, beyond && by_cap));
+    let tired = !met && a < end && turns >= $most_turns;
+    met = asked && (met || tired);
+    let surface = nearer(hit, met, begin + select(t, a, tired), $key + select(0u, 1u, beyond && by_cap));
     return $result;
 }
 

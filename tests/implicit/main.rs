@@ -6,6 +6,7 @@ mod common;
 mod cubics;
 mod pictures;
 mod rays;
+mod rounded;
 mod smooth;
 mod volumes;
 

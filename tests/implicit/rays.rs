@@ -1,6 +1,6 @@
 //! Random rays.
 
-use super::{SURFACES, scene_of};
+use super::{SURFACES, rounded, scene_of};
 use crate::common::{scene, settings};
 use etendue::gpu::probe::{Probe, Uniform, Values};
 use etendue::gpu::{Choice, Gpu};
@@ -57,6 +57,12 @@ pub struct Report {
     example: Option<String>,
 }
 
+impl Report {
+    fn wrong(&self) -> usize {
+        self.missed + self.ghosts + self.displaced + self.turned
+    }
+}
+
 /// The distance of a point from the surface, to first order, over the size of the bounds.
 fn off(implicit: &Implicit, p: DVec3) -> f64 {
     let q = implicit.to_local(p);
@@ -64,6 +70,13 @@ fn off(implicit: &Implicit, p: DVec3) -> f64 {
     let near = |h: f64| h.abs() / gradient.length().max(1e-9) / implicit.clip.radius();
     // On a cap the height does not matter.
     near(height).min(implicit.clip.depth(q).abs() / implicit.clip.radius())
+}
+
+/// Whether the formula is so near to 0 at a point that its rounding decides on which side it is. Where its gradient is small, that may be far
+/// from the surface.
+fn is_blurred(implicit: &Implicit, p: DVec3) -> bool {
+    let q = implicit.to_local(p);
+    implicit.height(q).abs() < 4.0 * rounded::of_height(implicit, q)
 }
 
 fn the_surface(world: &World) -> (&WorldPrimitive, &Implicit) {
@@ -230,15 +243,20 @@ fn answers(world: &World, count: usize, seed: u64, kinds: &[Kind]) -> (Vec<Value
         (x[6], x[7]) = (ray.face as f32, ray.medium as f32);
         inputs.push(x);
     }
+    let outputs = ask(world, &inputs);
+    (inputs, outputs)
+}
+
+/// What the kernel says of rays.
+fn ask(world: &World, inputs: &[Values]) -> Vec<Values> {
     let access = Access::Baked;
     let parsed = settings_of(world);
     let source = scene_probe_source(world, &parsed, access, BODY);
     let probe = Probe::compile_for(&GPU, &source, Some(access), Some(world))
         .unwrap_or_else(|e| panic!("{e}\n{source}"));
-    let outputs = probe
-        .run(&GPU, Some(world), &inputs)
-        .unwrap_or_else(|e| panic!("{e}"));
-    (inputs, outputs)
+    probe
+        .run(&GPU, Some(world), inputs)
+        .unwrap_or_else(|e| panic!("{e}"))
 }
 
 pub fn settings_of(world: &World) -> etendue::Settings {
@@ -268,6 +286,7 @@ fn judge(world: &World, x: &Values, y: &Values, report: &mut Report) {
         medium: x[7] as u32,
         face: x[6] as u32,
     };
+    let explained = |p: DVec3| off(implicit, p) <= ROUNDING || is_blurred(implicit, p);
     // The light is far away, and no matter here.
     let of_surface = |hit: &etendue::world::trace::Hit| matches!(hit.met, Met::Primitive(_));
     let expected = world.intersect(&ray).filter(of_surface);
@@ -325,6 +344,7 @@ fn judge(world: &World, x: &Values, y: &Values, report: &mut Report) {
             .map(|part| ray.at(from + (to - from) * part))
             .filter(|p| implicit.clip.holds(implicit.to_local(*p)))
             .filter(|p| implicit.height(implicit.to_local(*p)) * side > 0.0)
+            .filter(|p| !explained(*p))
             .map(|p| off(implicit, p))
             .fold(0.0, f64::max)
     };
@@ -332,22 +352,22 @@ fn judge(world: &World, x: &Values, y: &Values, report: &mut Report) {
         (None, None) => {}
         (Some(hit), None) => {
             let deep = deepest(hit.t, hit.t + 3.0 * size);
-            if deep > ROUNDING {
+            if deep > 0.0 {
                 wrong(|r| &mut r.missed, format!("{deep:e} deep"));
             }
         }
         (Some(hit), Some(t)) if t > hit.t + PLACE * size => {
             let deep = deepest(hit.t, t);
-            if deep > ROUNDING {
+            if deep > 0.0 {
                 wrong(|r| &mut r.missed, format!("{deep:e} deep"));
             }
         }
         (expected, Some(t)) => {
             let early = expected.as_ref().is_none_or(|hit| t < hit.t - PLACE * size);
             let o = off(implicit, ray.at(t));
-            if early && o > ROUNDING {
+            if early && !explained(ray.at(t)) {
                 wrong(|r| &mut r.ghosts, format!("{o:e} off"));
-            } else if !early && o > 20.0 * ROUNDING {
+            } else if !early && o > 20.0 * ROUNDING && !is_blurred(implicit, ray.at(t)) {
                 wrong(|r| &mut r.displaced, format!("{o:e} off"));
             }
             if let Some(hit) = expected.as_ref().filter(|_| !early) {
@@ -412,8 +432,7 @@ pub fn failures_of(name: &str, report: &Report, count: usize) -> Option<String> 
         (report.at_rim as f64) < most(1.0 / 18.0),
         "{name}: {report:?}"
     );
-    let wrong = report.missed + report.ghosts + report.displaced + report.turned;
-    (wrong > 0).then(|| format!("{name}: {report:?}"))
+    (report.wrong() > 0).then(|| format!("{name}: {report:?}"))
 }
 
 /// Of each surface, as a solid seen from outside, a solid of glass, and a sheet.
@@ -475,6 +494,83 @@ fn double_roots_are_met_where_they_are() {
             "the first of two: {x:?}: {y:?}"
         );
     }
+}
+
+/// Surfaces, and rays that random tests have found: start and direction. The first three came near a surface, and spent all of their parts there;
+/// of the others rounding was thought to be as large as at the start, so the root was taken to be anywhere in a part.
+const FOUND: &[(&str, &str, [[f32; 3]; 2])] = &[
+    (
+        "sphere",
+        "material = 'glass'",
+        [
+            [2.149_028_8, 0.155_262_63, 1.343_278_9],
+            [-0.743_697_1, 0.323_517_7, -0.585_022_15],
+        ],
+    ),
+    (
+        "metaballs",
+        "material = 'white'",
+        [
+            [-1.828_831_9, 0.258_759_92, 0.043_743_584],
+            [0.980_226, -0.076_188_65, 0.182_626_09],
+        ],
+    ),
+    (
+        "metaballs",
+        "material = 'white'\nclosed = false",
+        [
+            [-1.595_742_1, -1.088_485, -0.594_100_3],
+            [0.792_956_8, 0.492_599_93, 0.358_559_37],
+        ],
+    ),
+    (
+        "barth",
+        "material = 'white'",
+        [
+            [-0.427_265_47, 1.863_232_6, -1.223_118_5],
+            [-0.131_188_33, -0.774_042_1, 0.619_393_6],
+        ],
+    ),
+    (
+        "barth",
+        "material = 'glass'",
+        [
+            [-1.250_392_8, -0.469_251_22, 1.958_792_7],
+            [0.606_699_65, -0.117_201_76, -0.786_243_8],
+        ],
+    ),
+    (
+        "barth",
+        "material = 'white'\nclosed = false",
+        [
+            [-0.667_241_2, -0.869_214_5, -1.501_033_7],
+            [0.139_282_84, 0.050_005_816, 0.988_989_2],
+        ],
+    ),
+];
+
+#[test]
+fn rays_that_were_wrong_once() {
+    let mut failures = Vec::new();
+    for (name, keys, [origin, direction]) in FOUND {
+        let (_, formula, bounds) = SURFACES
+            .iter()
+            .find(|s| s.0 == *name)
+            .unwrap_or_else(|| panic!("{name}"));
+        let world = World::new(
+            &scene(&scene_of(formula, bounds, keys, "[0.3, 0.4, 50]")),
+            [8, 8],
+        );
+        let mut x = Values::default();
+        x[..3].copy_from_slice(origin);
+        x[3..6].copy_from_slice(direction);
+        let mut report = Report::default();
+        judge(&world, &x, &ask(&world, &[x])[0], &mut report);
+        if report.wrong() > 0 || report.most_turns > 200.0 {
+            failures.push(format!("{name}, {keys}: {report:?}"));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 #[test]
