@@ -83,7 +83,7 @@ def sampled(shape, n):
     return np.maximum(formula(shape)(x, y, z), np.maximum.reduce(np.broadcast_arrays(*outside))), low, high
 
 
-def as_mesh(shape, n, path):
+def as_mesh(shape, n, path, material):
     """The surface as triangles, in a PLY file; Mitsuba's element."""
     values, low, high = sampled(shape, n)
     vertices, triangles, _, _ = marching_cubes(values, 0.0, spacing=(high - low) / (n - 1))
@@ -95,11 +95,11 @@ def as_mesh(shape, n, path):
     head += [f"property float {axis}" for axis in "xyz"]
     head += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header", ""]
     path.write_bytes("\n".join(head).encode() + vertices.astype("<f4").tobytes() + rows.tobytes())
-    return f'<shape type="ply"><string name="filename" value="{path}"/><boolean name="face_normals" value="true"/>'
+    return f'<shape type="ply"><string name="filename" value="{path}"/><boolean name="face_normals" value="true"/>{material}</shape>'
 
 
-def as_grid(shape, n, path):
-    """The surface as signed distances; Mitsuba's element."""
+def as_grid(shape, n, path, material):
+    """The surface as signed distances; Mitsuba's elements. A grid can't be turned, but an instance of it can."""
     values, low, high = sampled(shape, n)
     step = (high - low) / (n - 1)
     # Near the surface, the value over its slope is the distance.
@@ -109,10 +109,14 @@ def as_grid(shape, n, path):
     mi.VolumeGrid(np.ascontiguousarray(distance.transpose(2, 1, 0))[..., None]).write(str(path))
     cube = np.diag([*(high - low), 1.0])
     cube[:3, 3] = low
-    matrix = " ".join(map(str, (placement(shape) @ cube).flatten()))
+    own, placed = (
+        f'<transform name="to_world"><matrix value="{" ".join(map(str, m.flatten()))}"/></transform>' for m in (cube, placement(shape))
+    )
+    name = path.stem
     return (
-        f'<shape type="sdfgrid"><string name="filename" value="{path}"/><string name="normals" value="smooth"/>'
-        f'<transform name="to_world"><matrix value="{matrix}"/></transform>'
+        f'<shape type="shapegroup" id="{name}"><shape type="sdfgrid"><string name="filename" value="{path}"/>'
+        f'<string name="normals" value="smooth"/>{own}{material}</shape></shape>'
+        f'<shape type="instance"><ref id="{name}"/>{placed}</shape>'
     )
 
 
@@ -154,8 +158,8 @@ def beside_mitsuba(program, name, folder):
         for n in sizes:
             given = xml.read_text()
             for i, s in enumerate(shapes):
-                element = make(s, n, folder / f"{name}.{i}.{kind}.{n}{'.ply' if kind == 'mesh' else '.vol'}")
-                element += f'<ref id="{s["material"]}"/></shape>'
+                path = folder / f"{name}.{i}.{kind}.{n}{'.ply' if kind == 'mesh' else '.vol'}"
+                element = make(s, n, path, f'<ref id="{s["material"]}"/>')
                 place = rf'<shape type="sphere">\s*<point name="center"[^>]*/>\s*<float name="radius" value="0.0{i + 1}125"/>.*?</shape>'
                 given, found = re.subn(place, lambda _: element, given, flags=re.S)
                 assert found == 1, found
