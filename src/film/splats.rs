@@ -395,6 +395,22 @@ mod tests {
     }
 
     #[test]
+    fn no_carry_of_a_large_sum_is_lost() {
+        let mut film = film();
+        let scale = film.splats().expect("splats").setup.scale as f32;
+        let (large, small) = (scale * 16f32.exp2(), scale * (-40f32).exp2());
+        let mut splats = vec![splat(1, 0, [large, 0.0, 0.0]); 200];
+        splats.extend(vec![splat(1, 0, [small, 0.0, 0.0]); 100]);
+        let whole = Rect::whole(SIZE);
+        film.put_passes(whole, &Passes::new(0..1, SIZE[0], splats.clone()));
+        let sum = |film: &Film| film.splats().expect("splats").sums()[1][0][0];
+        assert_eq!(sum(&film), 200 * (1 << 56) + 100);
+        // What is beyond its range stays the largest number, and does not begin at 0 again.
+        film.put_passes(whole, &Passes::new(4..5, SIZE[0], splats));
+        assert_eq!(sum(&film), u64::MAX);
+    }
+
+    #[test]
     fn a_pixel_is_the_mean_of_its_samples_plus_that_of_its_passes() {
         let mut film = film();
         let whole = Rect::whole(SIZE);
