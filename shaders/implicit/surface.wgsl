@@ -40,7 +40,7 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
     var met = beyond;
     var t = 0.0;
     var turns = 0u;
-    // The least rounding so far, or more.
+    // The formula's rounding error near the surface: the least that a part has had. Where the ray starts it may be a thousand times larger.
     var noise = first.z;
     while asked && !met && a < end && turns < $most_turns && trips_left > 0u {
         trips_left -= 1u;
@@ -66,7 +66,8 @@ fn $name(hit: Hit, ray: Ray) -> Hit {
         let found = crossed && clear && (must - may <= $tolerance || f.z <= 2.0 * noise);
         // Along the surface rounding alone would be looked at, again and again.
         let blurred = !clear && f.z <= 4.0 * noise;
-        // A ray may run beside the surface, as near as rounding, for hundreds of least parts. So that part grows in time, to 512 times.
+        // A ray may run beside the surface, as near as rounding, for hundreds of least parts. So the least part grows from the 48th on, to 512
+        // times its length.
         let least = $least * exp2(clamp(0.25 * (f32(turns) - 48.0), 0.0, 9.0));
         let smallest = length <= select(least, fmax(least, 0.5 * a), blurred);
         let ends_here = crossed || (clear && rise <= 0.0);
