@@ -4,6 +4,7 @@ pub mod atomic;
 mod error;
 pub mod kind;
 pub mod lock;
+pub(crate) mod nifti;
 pub mod npy;
 mod resolve;
 pub mod room;

@@ -4,7 +4,7 @@ use super::Shape;
 use super::format::Table;
 use super::implicit::{Rotation, number_text, rotation_text, vector_text};
 use super::value::{Finite, LARGEST, Lengths, Point, Text, Truth, Value, Wrong, wrong};
-use crate::files::{npy, reason};
+use crate::files::{nifti, npy, reason};
 use crate::implicit::volume::{AxisOrder, MOST_VALUES, Volume};
 use crate::implicit::{Grid, Implicit};
 use glam::DMat3;
@@ -81,7 +81,7 @@ impl Named for AxisOrder {
 pub(super) fn read(t: &mut impl Table) -> Option<Shape> {
     let file = t.required::<Text>(
         "file",
-        "NumPy file (.npy) with an array of three indices: uint8, uint16, float32 or float64. Its path is relative to the scene file.",
+        "NumPy file (.npy) with an array of three indices: uint8, uint16, float32 or float64; or a NIfTI file (.nii, .nii.gz) of three dimensions. Its path is relative to the scene file.",
     );
     let order = t.defaulted(
         "order",
@@ -154,8 +154,19 @@ pub(super) fn load(path: &Path, order: AxisOrder) -> Result<Volume, NoVolume> {
     if file.metadata().map_err(system)?.is_dir() {
         return Err(system(std::io::ErrorKind::IsADirectory.into()));
     }
-    let array = npy::read(BufReader::new(file), 3, MOST_VALUES).map_err(NoVolume::Wrong)?;
-    Volume::of_array(array, order).map_err(NoVolume::Wrong)
+    let file = BufReader::new(file);
+    let array = match nifti::is_named(&path.to_string_lossy()) {
+        Some(compressed) => {
+            if order != AxisOrder::Zyx {
+                let message =
+                    "a NIfTI file says itself which axis is which, so `order` must be left out";
+                return Err(NoVolume::Wrong(message.into()));
+            }
+            nifti::read(file, compressed, MOST_VALUES)
+        }
+        None => npy::read(file, 3, MOST_VALUES),
+    };
+    Volume::of_array(array.map_err(NoVolume::Wrong)?, order).map_err(NoVolume::Wrong)
 }
 
 /// The keys of an isosurface, as they stand in a file. `string` writes a string.

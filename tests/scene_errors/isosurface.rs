@@ -26,6 +26,20 @@ fn array(descr: &str, shape: &[u64], numbers: &[u8]) -> Vec<u8> {
     [&header(descr, shape), numbers].concat()
 }
 
+/// A NIfTI file of 2 x 2 x 2 numbers.
+fn nifti(numbers: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0; 352];
+    bytes[..4].copy_from_slice(&348i32.to_le_bytes());
+    for (k, n) in [3u8, 2, 2, 2].into_iter().enumerate() {
+        bytes[40 + 2 * k] = n;
+    }
+    bytes[70] = 2;
+    bytes[108..112].copy_from_slice(&352f32.to_le_bytes());
+    bytes[344..348].copy_from_slice(b"n+1\0");
+    bytes.extend(numbers);
+    bytes
+}
+
 fn one(bytes: &[u8], keys: &str, message: &str) {
     let (_folder, found) = with(bytes, keys);
     let found = found.err().unwrap_or_default();
@@ -115,6 +129,29 @@ fn keys_that_are_wrong() {
 }
 
 #[test]
+fn nifti_files_that_are_no_volume() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let found = |bytes: &[u8], name: &str, keys: &str| {
+        fs::write(folder.path().join(name), bytes).expect("written");
+        let path = folder.path().join(name);
+        let keys = format!("file = '{}'\nlevel = 3\n{REST}\n{keys}", path.display());
+        with(b"", &keys).1.err().unwrap_or_default().join("\n")
+    };
+    let good = nifti(&[0, 1, 2, 3, 4, 5, 6, 7]);
+    assert_eq!(found(&good, "d.nii", ""), "");
+    assert_eq!(found(&good, "D.NII", "order = 'zyx'"), "");
+    for (bytes, name, keys, message) in [
+        (&good[..], "d.nii", "order = 'xyz'", "`order` must be left out"),
+        (&good[..], "d.nii.gz", "", "not a NIfTI file"),
+        (&good[..], "d.npy", "", "not a NumPy array"),
+        (&good[..355], "d.nii", "", "ends after 3 of 8 bytes"),
+    ] {
+        let found = found(bytes, name, keys);
+        assert!(found.contains(message), "{name}: {found}");
+    }
+}
+
+#[test]
 fn the_hash_covers_the_numbers_and_not_the_name() {
     let hash = |bytes: &[u8], name: &str, keys: &str| {
         let folder = tempfile::tempdir().expect("temporary folder");
@@ -135,6 +172,7 @@ fn the_hash_covers_the_numbers_and_not_the_name() {
     let bytes = array("|u1", &[2, 2, 2], &numbers);
     let first = hash(&bytes, "a.npy", "level = 3");
     assert_eq!(hash(&bytes, "b.npy", "level = 3.0\norder = 'zyx'"), first);
+    assert_eq!(hash(&nifti(&numbers), "a.nii", "level = 3"), first);
     let mut other = numbers;
     other[5] = 9;
     let other = array("|u1", &[2, 2, 2], &other);
