@@ -141,7 +141,12 @@ fn nifti_files_that_are_no_volume() {
     assert_eq!(found(&good, "d.nii", ""), "");
     assert_eq!(found(&good, "D.NII", "order = 'zyx'"), "");
     for (bytes, name, keys, message) in [
-        (&good[..], "d.nii", "order = 'xyz'", "`order` must be left out"),
+        (
+            &good[..],
+            "d.nii",
+            "order = 'xyz'",
+            "`order` must be left out",
+        ),
         (&good[..], "d.nii.gz", "", "not a NIfTI file"),
         (&good[..], "d.npy", "", "not a NumPy array"),
         (&good[..355], "d.nii", "", "ends after 3 of 8 bytes"),
