@@ -43,8 +43,7 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
     // One vertex of a path a turn. The host keeps the turns below the driver's limit on loop trips, or the kernel counts them.
     while film.s < film.end && trips_remain() {
         // Meet the next surface.
-        let hit = intersect(path.ray);
-        count_ray(&film, true);
+        let hit = next_hit(&path, pixel, sight, &film);
         let meets_light = hit.key < LIGHT_KEYS;
 
         // A light ends the path.
@@ -58,15 +57,8 @@ fn render(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) 
         // motions.
         let meets_surface = !meets_light & (hit.key != NONE) & looks_on(&path, sight);
         let met = Hit(hit.t, select(0u, hit.key, meets_surface));
-        let lives = spend_trips(scatter_if(meets_surface, &path, met, pixel, sight, &film));
-
-        // Add the sample of a path that has ended and start the next at once: no lane waits for a longer path.
-        let is_sample = !lives & !is_glance(&path);
-        add_sample(&film, path.radiance, is_sample);
-        keep_counts(&film, is_sample);
-        let glances = glances_after(&path, sight);
-        let seen = select(vec3f(0.0), path.radiance, is_glance(&path));
-        begin_path(&path, !lives, camera_path(pixel, film.s, glances, sight), glances, seen);
+        let lives = scatter_if(meets_surface, &path, met, pixel, sight, &film);
+        next_path(&path, lives, pixel, sight, &film);
     }
     store_pixel(pixel, &film);
 }

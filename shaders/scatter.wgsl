@@ -23,8 +23,7 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
     let receiver = receiver_at(&x);
     let direct = direct_light_if(goes_on & !specular, &x, receiver, key, u, path.depth, film);
     // Not even zero is added where nothing is asked: beta may have left f32.
-    let gathered = path.beta * (direct.radiance * light_scale(x.medium));
-    path.radiance += select(vec3f(0.0), gathered, goes_on & !specular);
+    gather(path, path.beta * (direct.radiance * light_scale(x.medium)), goes_on & !specular);
     path.only_lights = path.only_lights | (WHITTED & !specular);
 
     // A new direction.

@@ -31,7 +31,7 @@ fn light_sample(asks: bool, x: ptr<function, Interaction>, to: Receiver, u: Ligh
     count_ray(film, traced);
     let shadow = Ray(x.p, wi.d, x.face, x.medium, chosen.light.face);
     // This && is a branch on purpose: walks through trees are long.
-    let lit = traced && !occluded(shadow, wi.distance, chosen.index);
+    let lit = traced && is_lit(shadow, wi.distance, chosen.index);
     let radiance = f_cos * chosen.light.radiance * (inverse_pdf * wi.worth);
     return DirectLight(select(vec3f(0.0), radiance, lit), chosen.weights);
 }

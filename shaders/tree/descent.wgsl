@@ -1,13 +1,6 @@
-// A walk through the trees of one kind of surface.
+// A walk of one ray through the trees of one kind of surface.
 // A template: src/kernel/trees.rs fills in the names that begin with a dollar sign, once for the nearest hit and once for shadow rays.
-// $walk_leaf is another template, by the kind of surface.
-
-// Where a walk is: the unit of a node or a leaf, and what was put off on the way there, the last first: a word
-// for each node on the way, as `put_off` makes it. They are in registers: an array would lie in memory.
-struct $walk_place {
-    at: u32,
-    $words
-}
+// See tree/visit.wgsl for its steps.
 
 fn $walk(start: Ray, first: Hit) -> Hit {
     var hit = first;
@@ -31,24 +24,4 @@ fn $walk(start: Ray, first: Hit) -> Hit {
         header = tree.y;
     }
     return hit;
-}
-
-fn $walk_visit(ray: Ray, slabs: Slabs, walk: ptr<function, $walk_place>, hit: ptr<function, Hit>) {
-    let place = four_records(walk.at);
-    let a = textureLoad(records, place);
-    let b = textureLoad(records, place + vec2u(1u, 0u));
-    let c = textureLoad(records, place + vec2u(2u, 0u));
-    // A leaf sets the distance, and a node reads it. A processor does both at the same time if neither waits for the other.
-    let met = children_met(slabs, a, b, c, hit.t);
-    if !is_node(a) {
-        *hit = $walk_leaf(*hit, ray, place, a, b);
-    }
-    let down = met.x != NO_CHILD;
-    let more = put_off(c.z, met);
-    let next = walk.put_off_0;
-    let rest = without_next(next);
-    walk.at = select(next_of(next), c.z + (met.x & 3u), down);
-    let push = more != 0u;
-    let pop = !down && rest == 0u;
-$shift
 }

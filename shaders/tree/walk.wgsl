@@ -1,5 +1,5 @@
 // Walking a bounding volume hierarchy that is four wide, with the children's boxes on a grid of 8 bits [Ylitie2017]. The walk itself is
-// generated for each kind of surface: see descent.wgsl.
+// generated for each kind of surface: see visit.wgsl, descent.wgsl and queue.wgsl.
 
 // The texture is divided into units of four records. Unit 0 is a node without children: a walk goes there when it is done.
 //
@@ -52,24 +52,17 @@ fn put_back(hit: Hit, near: Approach, first: Hit) -> Hit {
 
 // A ray made ready for boxes.
 struct Slabs {
-    // The ray's origin, moved by the greatest rounding error of the origin or of a hit: `enter` for the sides of a box by which the ray
-    // enters, `leave` for those by which it leaves. The walk must not miss what a loop over all surfaces would meet. The boxes make up
-    // for the rounding errors of what they hold: see src/world/tree/mod.rs.
-    enter: vec3f,
-    leave: vec3f,
     inverse: vec3f,
-    backwards: vec3<bool>,
+    // The greatest rounding error of the ray's origin or of a hit. Boxes are met as if they were larger by it: the walk must not miss
+    // what a loop over all surfaces would meet. The boxes make up for the rounding errors of what they hold: see src/world/tree/mod.rs.
+    slack: f32,
 }
 
 fn slabs_of(ray: Ray) -> Slabs {
     // Components that are zero or almost zero, of either sign, are replaced, so that the inverse is finite.
     let d = select(ray.d, vec3f(1.0e-20), abs(ray.d) < vec3f(1.0e-20));
-    let inverse = 1.0 / d;
-    let backwards = d < vec3f(0.0);
     // About twenty units in the last place of f32.
-    let slack = 1.2e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z));
-    let against = select(vec3f(slack), vec3f(-slack), backwards);
-    return Slabs(ray.o + against, ray.o - against, inverse, backwards);
+    return Slabs(1.0 / d, 1.2e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z)));
 }
 
 fn is_node(a: vec4u) -> bool {
@@ -91,15 +84,18 @@ fn fmin4(a: vec4f, b: vec4f) -> vec4f {
 
 // The children of a node whose boxes the ray meets no farther than t, the nearest first: the lowest two bits of a word are the number of
 // the child. The other bits are where the ray enters, as f32, which orders positive numbers like integers.
-fn children_met(s: Slabs, a: vec4u, b: vec4u, c: vec4u, t: f32) -> vec4u {
+fn children_met(o: vec3f, s: Slabs, a: vec4u, b: vec4u, c: vec4u, t: f32) -> vec4u {
     let origin = bitcast<vec3f>(a.xyz);
     let steps = bitcast<vec3f>(((vec3u(a.w) >> vec3u(0u, 8u, 16u)) & vec3u(255u)) << vec3u(23u)) * s.inverse;
     // Where the ray passes the origin of the grid.
-    let enter = (origin - s.enter) * s.inverse;
-    let leave = (origin - s.leave) * s.inverse;
+    let passes = (origin - o) * s.inverse;
+    let wider = s.slack * abs(s.inverse);
+    let enter = passes - wider;
+    let leave = passes + wider;
+    let backwards = s.inverse < vec3f(0.0);
     let high = vec3u(b.w, c.xy);
-    let by = select(b.xyz, high, s.backwards);
-    let to = select(high, b.xyz, s.backwards);
+    let by = select(b.xyz, high, backwards);
+    let to = select(high, b.xyz, backwards);
     let near_xy = fmax4(on_grid(by.x) * steps.x + enter.x, on_grid(by.y) * steps.y + enter.y);
     let near = fmax4(near_xy, fmax4(on_grid(by.z) * steps.z + enter.z, vec4f(0.0)));
     let far_xy = fmin4(on_grid(to.x) * steps.x + leave.x, on_grid(to.y) * steps.y + leave.y);

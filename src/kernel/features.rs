@@ -1,10 +1,11 @@
 //! What the kernel of a scene needs, decided once from world and settings.
 
-use super::access::Access;
+use super::access::{Access, BAKED_LIMIT};
 use super::glances;
 use super::layout::ShapeKind;
 use super::light_paths::LightPaths;
 use super::literal::{float, vector};
+use super::trees::Parted;
 use crate::film::{BLOCK, REPLICATES};
 use crate::scene::MaterialKind;
 use crate::settings::{Integrator, LightParts, Settings};
@@ -126,6 +127,9 @@ pub(super) struct Features {
     /// Places in the pixel are drawn together with points on lights. In scenes of many things every pixel has edges, and edges of
     /// shadows. Large things are no less noisy with it, and a kernel without trees would be a twentieth slower.
     pub draws_together: bool,
+    /// Rays wait in a queue: see `shaders/rays/queued.wgsl`. In kernels without trees all rays take the same time. In closed rooms, where every
+    /// path goes on, a queue gives 0.95 to 1.05 times the speed.
+    pub queued: bool,
     /// Number of the last vertex that can matter, for the light that is kept.
     pub last_depth: u32,
     /// Some paths are cut there that could still find light.
@@ -193,6 +197,7 @@ impl Features {
             sight: glances::sight(world, settings, access),
             strata: settings.strata,
             draws_together: access == Access::Tree && settings.strata.is_power_of_two(),
+            queued: false,
             last_depth,
             count_truncated: settings.max_depth < needed_depth(settings),
             materials,
@@ -220,6 +225,7 @@ impl Features {
             sight: 0,
             strata: probe.strata,
             draws_together: probe.draws_together,
+            queued: false,
             last_depth: 64,
             count_truncated: false,
         }
@@ -231,8 +237,21 @@ impl Features {
             light_sampling: false,
             hidden_lights: false,
             evaluates: true,
+            queued: false,
             ..self.clone()
         }
+    }
+
+    /// The same for a path loop, whose rays wait in a queue where that serves.
+    pub fn with_queue(self, world: &World, parted: Option<&Parted>) -> Self {
+        // One walk takes the whole queue, and what lies outside its tree is met beforehand, without a loop. There is room for one shadow ray.
+        let fits = |p: &Parted| p.groups.len() == 1 && p.apart.len() <= BAKED_LIMIT;
+        let queued = parted.is_some_and(fits)
+            && self.light_sampling
+            && self.shadow_rays == 1
+            && !self.has_implicit()
+            && visibility::rays_escape(world);
+        Self { queued, ..self }
     }
 
     pub fn has_material(&self, kind: MaterialKind) -> bool {

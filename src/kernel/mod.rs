@@ -66,11 +66,13 @@ pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Ke
     let access = access.unwrap_or_else(|| Access::choose(world));
     let aims = light_paths::aims(world, settings);
     let paths = (aims.as_ref()).map(|aims| LightPaths::new(world, settings, access, aims));
-    let features = Features::new(world, settings, access, paths);
-    let light = aims.map(|aims| light_kernel(world, settings, &features, aims));
+    let parted = (access == Access::Tree).then(|| Parted::new(world));
+    let parted = parted.as_ref();
+    let features = Features::new(world, settings, access, paths).with_queue(world, parted);
+    let light = aims.map(|aims| light_kernel(world, settings, &features, parted, aims));
     let mut wgsl = String::from("// Made for one scene by etendue.\n");
     append(&mut wgsl, &features, &modules::of_path(&features));
-    wgsl.push_str(&scene_text(world, settings, &features));
+    wgsl.push_str(&scene_text(world, settings, &features, parted));
     if let Some(LightKernel { aims, photons, .. }) = light.as_ref().filter(|l| !l.aims_bound) {
         wgsl.push_str(&light_paths::aims_in_text(world, aims, *photons));
     }
@@ -88,12 +90,13 @@ fn light_kernel(
     world: &World,
     settings: &Settings,
     features: &Features,
+    parted: Option<&Parted>,
     aims: Aims,
 ) -> LightKernel {
     let own = features.of_light_paths();
     let mut wgsl = String::from("// Made for one scene by etendue.\n");
     append(&mut wgsl, &own, &modules::of_light_paths(&own));
-    wgsl.push_str(&scene_text(world, settings, &own));
+    wgsl.push_str(&scene_text(world, settings, &own, parted));
     wgsl.push_str(&emit::lights::medium(world));
     LightKernel {
         wgsl,
@@ -104,17 +107,22 @@ fn light_kernel(
     }
 }
 
-/// All that the path loop of a scene calls: constants, modules, and what is generated for the scene.
-fn scene_text(world: &World, settings: &Settings, features: &Features) -> String {
+/// All that the path loop of a scene calls: constants, modules, and what is generated for the scene. `parted` says which surfaces lie in
+/// trees, if there are trees.
+fn scene_text(
+    world: &World,
+    settings: &Settings,
+    features: &Features,
+    parted: Option<&Parted>,
+) -> String {
     let mut s = features.constants();
     s.push_str(&features.scene_constants(world, settings));
-    let parted = (features.access == Access::Tree).then(|| Parted::new(world));
     if features.counts_trips() {
-        let [start, vertex] = trips::counted(world, settings, features, parted.as_ref());
+        let [start, vertex] = trips::counted(world, settings, features, parted);
         constant(&mut s, "TRIPS_AT_START", "u32", format!("{start}u"));
         constant(&mut s, "TRIPS_AT_VERTEX", "u32", format!("{vertex}u"));
     }
-    if let Some(parted) = &parted {
+    if let Some(parted) = parted {
         s.push_str(&records::Records::new(world, parted).constants(world));
         if light_tree::serves(world.lights.len()) {
             let ends = light_tree::ends(world.lights.len());
@@ -127,7 +135,7 @@ fn scene_text(world: &World, settings: &Settings, features: &Features) -> String
     s.push_str(&emit::materials::predicates(features));
     s.push_str(&emit::materials::dispatch(features));
     s.push_str(&emit::implicit::generate(world, features));
-    s.push_str(&emit::surfaces::generate(world, features, parted.as_ref()));
+    s.push_str(&emit::surfaces::generate(world, features, parted));
     s.push_str(&emit::lights::scale(world));
     s.push_str(&emit::lights::keeps(settings.light));
     if features.light_sampling {
@@ -193,7 +201,8 @@ pub fn scene_probe_source(
     body: &str,
 ) -> String {
     let features = Features::new(world, settings, access, None);
-    let mut s = scene_text(world, settings, &features);
+    let parted = (access == Access::Tree).then(|| Parted::new(world));
+    let mut s = scene_text(world, settings, &features, parted.as_ref());
     s.push_str(&probe_entry(body));
     s
 }

@@ -51,7 +51,10 @@ modules! {
     BUFFERS = "fetch/buffers",
     RECORDS = "fetch/records",
     WALK = "tree/walk",
+    QUEUED_WALKS = "tree/queued",
+    VISIT = "tree/visit",
     DESCENT = "tree/descent",
+    QUEUE = "tree/queue",
     LEAF_SPHERE = "tree/sphere",
     LEAF_DISK = "tree/disk",
     LEAF_CYLINDER = "tree/cylinder",
@@ -77,6 +80,8 @@ modules! {
     PATH = "path",
     FILM = "film",
     SCATTER = "scatter",
+    RAYS_ONE_BY_ONE = "rays/one_by_one",
+    RAYS_QUEUED = "rays/queued",
     EMISSION = "light/emission",
     DIRECT_NONE = "direct/none",
     DIRECT_SAMPLED = "direct/sampled",
@@ -118,6 +123,11 @@ pub(super) fn of_path(f: &Features) -> Vec<Module> {
     let mut modules = vec![
         PATH,
         SCATTER,
+        if f.queued {
+            RAYS_QUEUED
+        } else {
+            RAYS_ONE_BY_ONE
+        },
         EMISSION,
         FILM,
         if f.sight > 0 {
@@ -235,7 +245,10 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
     match f.access {
         Access::Baked => {}
         Access::Buffers => modules.push(BUFFERS),
-        Access::Tree => modules.extend([RECORDS, WALK]),
+        Access::Tree => {
+            modules.extend([RECORDS, WALK]);
+            modules.extend(f.queued.then_some(QUEUED_WALKS));
+        }
     }
     modules
 }

@@ -5,9 +5,9 @@
 //! and groups with few members, are met one by one, as in small scenes.
 
 use super::access::BAKED_LIMIT;
-use super::emit::surfaces::{Function, Target, for_shadows, targets};
+use super::emit::surfaces::{Function, Target, Variant, for_shadows, targets};
 use super::layout::ShapeKind;
-use super::modules::{DESCENT, LEAF_CYLINDER, LEAF_DISK, LEAF_SPHERE, Module};
+use super::modules::{DESCENT, LEAF_CYLINDER, LEAF_DISK, LEAF_SPHERE, Module, QUEUE, VISIT};
 use super::preprocess::fill;
 use crate::world::{Bounds, Geometry, Tree, World, WorldPrimitive};
 use glam::DVec3;
@@ -53,6 +53,7 @@ impl Parted {
                 None => kinds.push((s.function, vec![s.number])),
             }
         }
+        put_glass_with_opaque(&mut kinds);
         let kinds: Vec<(Function, Vec<usize>)> = kinds
             .into_iter()
             .flat_map(|(f, numbers)| by_distance(world, numbers).map(move |n| (f, n)))
@@ -89,6 +90,23 @@ impl Parted {
     /// before they are built.
     pub fn end(&self) -> usize {
         UNIT * (1 + self.groups.len())
+    }
+}
+
+/// Opaque things share a tree with glass ones of the same shape, if there are many of both: one walk is shorter than two. The function of
+/// glass serves all, for the leaves of opaque things say so.
+fn put_glass_with_opaque(kinds: &mut Vec<(Function, Vec<usize>)>) {
+    for shape in [ShapeKind::Sphere, ShapeKind::Cylinder] {
+        let many = |variant| {
+            let function = Function { shape, variant };
+            (kinds.iter()).position(|k| k.0 == function && k.1.len() >= LEAST_IN_TREE[0])
+        };
+        if let (Some(opaque), Some(glass)) = (many(Variant::Outside), many(Variant::Boundary)) {
+            let numbers = std::mem::take(&mut kinds[opaque].1);
+            kinds[glass].1.extend(numbers);
+            kinds[glass].1.sort_unstable();
+            kinds.remove(opaque);
+        }
     }
 }
 
@@ -161,13 +179,31 @@ pub(super) fn calls(s: &mut String, parted: &Parted, walk: &str) {
 pub(super) fn walks(world: &World, parted: &Parted, shadows: bool) -> String {
     let mut s = String::new();
     for (k, group) in parted.groups.iter().enumerate() {
-        s.push_str(&walk(&format!("nearest_{k}"), group, group.function, false));
+        let name = format!("nearest_{k}");
+        s.push_str(&walk(&name, group, group.function, Purpose::Nearest));
         if shadows {
             let function = shadow_function(world, group);
-            s.push_str(&walk(&format!("any_{k}"), group, function, true));
+            s.push_str(&walk(&format!("any_{k}"), group, function, Purpose::Any));
         }
     }
     s
+}
+
+/// `trace`, which takes a queue of rays through the only tree.
+pub(super) fn queue(parted: &Parted) -> String {
+    let walk = |group: &Group| walk("queue", group, group.function, Purpose::Queue);
+    parted.groups.iter().map(walk).collect()
+}
+
+/// What a walk finds.
+#[derive(Debug, Clone, Copy)]
+enum Purpose {
+    /// The nearest hit of a ray.
+    Nearest,
+    /// Any hit of a shadow ray.
+    Any,
+    /// Those of a queue of rays.
+    Queue,
 }
 
 /// The function for shadow rays. If some solids of a group hold lights and others do not, the function of the former serves all.
@@ -185,8 +221,8 @@ fn shadow_function(world: &World, group: &Group) -> Function {
     }
 }
 
-/// One walk, which calls `function` at the leaves: for the nearest hit, or for `any` hit.
-fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
+/// One walk, which calls `function` at the leaves.
+fn walk(name: &str, group: &Group, function: Function, purpose: Purpose) -> String {
     let (leaf, shape): (Module, &str) = match group.function.shape {
         ShapeKind::Sphere => (LEAF_SPHERE, "sphere"),
         ShapeKind::Disk => (LEAF_DISK, "disk"),
@@ -195,7 +231,10 @@ fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
             unreachable!("none is in a tree")
         }
     };
-    let hit = if any { "hit" } else { "Hit(FAR, NONE)" };
+    let hit = match purpose {
+        Purpose::Any => "hit",
+        _ => "Hit(FAR, NONE)",
+    };
     // What leaves hold of each kind.
     let field = |field: &str| match (field, group.function.shape) {
         ("faces.x", ShapeKind::Sphere) => "4u * i + 1u",
@@ -216,16 +255,23 @@ fn walk(name: &str, group: &Group, function: Function, any: bool) -> String {
         .map(|k| format!("put_off_{k}: u32,\n    "))
         .collect();
     let (header, shift) = (format!("{}u", group.header), shift(words));
+    let (goes_on, keep, walk) = match purpose {
+        Purpose::Nearest => ("", format!("keep_nearest(hit, {call}, item)"), DESCENT),
+        Purpose::Any => {
+            let keep = format!("keep_blocker(hit, {call}, item)");
+            ("hit.key == NONE &&", keep, DESCENT)
+        }
+        Purpose::Queue => ("", format!("keep_queued(hit, {call}, item, ray)"), QUEUE),
+    };
     let values = [
         ("walk", name),
         ("header", &header),
-        ("goes_on", if any { "hit.key == NONE &&" } else { "" }),
-        ("keep", if any { "keep_blocker" } else { "keep_nearest" }),
-        ("call", &call),
+        ("goes_on", goes_on),
+        ("keep", &keep),
         ("words", declared.trim_end()),
         ("shift", shift.trim_end()),
     ];
-    [leaf, DESCENT]
+    [leaf, VISIT, walk]
         .map(|template| fill(template.text, &values) + "\n")
         .concat()
 }

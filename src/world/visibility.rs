@@ -1,6 +1,6 @@
 //! Which surfaces can come between a light and a point that a path reaches.
 
-use super::{Bounds, Geometry, Side, Tree, World, WorldLight};
+use super::{Bounds, Geometry, Side, Tree, World, WorldLight, WorldPrimitive};
 use crate::coincidence::{COINCIDENT, slack};
 use glam::DVec3;
 use std::collections::BTreeSet;
@@ -34,6 +34,32 @@ fn hull_faces(world: &World) -> BTreeSet<u32> {
             _ => None,
         })
         .collect()
+}
+
+/// Whether some ray of a path may meet nothing: opaque walls are not all around.
+pub(crate) fn rays_escape(world: &World) -> bool {
+    let opaque_walls = || world.primitives.iter().filter(|p| p.side != Side::Both);
+    let encloses =
+        |p: &WorldPrimitive| p.side == Side::Inside || matches!(p.geometry, Geometry::Implicit(_));
+    if opaque_walls().any(encloses) {
+        return false;
+    }
+    let normals: Vec<DVec3> = opaque_walls()
+        .filter_map(|p| match p.geometry {
+            Geometry::Plane { normal, .. } => Some(normal),
+            _ => None,
+        })
+        .collect();
+    // Directions that lead away from all planes, or along them, are a cone. If there are any, one of them lies along two planes, or the
+    // planes have a direction in common.
+    let leads_away = |d: DVec3| d != DVec3::ZERO && normals.iter().all(|n| n.dot(d) >= -1e-9);
+    let pairs = || {
+        let with = |i: usize| normals[..i].iter().map(move |b| (i, *b));
+        (0..normals.len()).flat_map(with)
+    };
+    let edges = pairs().map(|(i, b)| normals[i].cross(b).normalize_or_zero());
+    let mut edges = edges.flat_map(|d| [d, -d]);
+    edges.any(leads_away) || pairs().all(|(i, b)| normals[i].cross(b).length() < 1e-9)
 }
 
 /// Whether a surface can lie between a light and a point that a path reaches.

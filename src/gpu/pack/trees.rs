@@ -2,7 +2,7 @@
 
 use crate::kernel::layout::{ShapeKind, Surface};
 use crate::kernel::trees::{Parted, UNIT, boxes};
-use crate::world::{Below, Box32, Tree, World, visibility};
+use crate::world::{AIR, Below, Box32, Tree, World, visibility};
 
 /// A node, a leaf or a header.
 type Unit = [[u32; 4]; UNIT];
@@ -60,16 +60,23 @@ fn put(records: &mut [[u32; 4]], unit: usize, what: &Unit) {
     records[UNIT * unit..][..UNIT].copy_from_slice(what);
 }
 
+/// The solid and its parent in the leaf of an opaque thing, which a ray meets in any medium: see `shaders/ray.wgsl`.
+const ANY_MEDIUM: u32 = u32::MAX;
+
 /// A surface, its item in the words that its kind does not need.
 fn leaf(shape: ShapeKind, s: &Surface, item: u32) -> Unit {
     let with = |[x, y, z]: [f32; 3], w: f32| [x, y, z, w].map(f32::to_bits);
     let (point, axis) = (with(s.point, s.radius), with(s.axis, s.offset));
     let [x, y, z] = s.faces;
+    let (solid, parent) = match s.solid {
+        AIR => (ANY_MEDIUM, ANY_MEDIUM),
+        solid => (solid, s.parent),
+    };
     match shape {
-        ShapeKind::Sphere => [point, [item, s.solid, s.parent, 0], [0; 4], [0; 4]],
+        ShapeKind::Sphere => [point, [item, solid, parent, 0], [0; 4], [0; 4]],
         ShapeKind::Disk => [point, axis, [item, x, 0, 0], [0; 4]],
         ShapeKind::Cylinder => {
-            let last = [s.top.to_bits(), s.solid, s.parent, item];
+            let last = [s.top.to_bits(), solid, parent, item];
             [point, axis, [x, y, z, 0], last]
         }
         ShapeKind::Plane | ShapeKind::HugeSphere | ShapeKind::Implicit => {

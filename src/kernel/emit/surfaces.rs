@@ -100,27 +100,32 @@ pub(in crate::kernel) fn generate(
         Some(parted) => (parted.apart.clone(), Access::Buffers),
         None => (targets(world), features.access),
     };
-    if let Some(parted) = parted {
+    // Rays in a queue meet what lies in trees by themselves.
+    let queued = features.queued;
+    let apart = if queued { "_apart" } else { "" };
+    if let Some(parted) = parted.filter(|_| !queued) {
         s.push_str(&trees::walks(world, parted, features.light_sampling));
     }
-    s.push_str(
+    let _ = write!(
+        s,
         "// The nearest surface that the ray meets; coincident ones in the order of the format.
-fn intersect(ray: Ray) -> Hit {
+fn intersect{apart}(ray: Ray) -> Hit {{
     var hit = Hit(FAR, NONE);
 ",
     );
     calls(&mut s, world, &one_by_one, each, true);
-    if let Some(parted) = parted {
+    if let Some(parted) = parted.filter(|_| !queued) {
         trees::calls(&mut s, parted, "nearest");
     }
     s.push_str("    return hit;\n}\n\n");
     if !features.light_sampling {
         return s;
     }
-    s.push_str(
+    let _ = write!(
+        s,
         "// Whether anything lies within `distance` of the ray's origin. What cannot come between two points of the room, as its own
 // walls, is not asked.
-fn occluded(ray: Ray, distance: f32, light: u32) -> bool {
+fn occluded{apart}(ray: Ray, distance: f32, light: u32) -> bool {{
     var hit = Hit(distance, NONE);
 ",
     );
@@ -130,7 +135,7 @@ fn occluded(ray: Ray, distance: f32, light: u32) -> bool {
         t.function = for_shadows(world, t);
     }
     calls(&mut s, world, &one_by_one, each, false);
-    if let Some(parted) = parted {
+    if let Some(parted) = parted.filter(|_| !queued) {
         trees::calls(&mut s, parted, "any");
     }
     let hidden = if features.hidden_lights {
@@ -139,6 +144,9 @@ fn occluded(ray: Ray, distance: f32, light: u32) -> bool {
         ""
     };
     let _ = writeln!(s, "    return hit.key != NONE{hidden};\n}}\n");
+    if let Some(parted) = parted.filter(|_| queued) {
+        s.push_str(&trees::queue(parted));
+    }
     s
 }
 
