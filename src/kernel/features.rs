@@ -242,16 +242,15 @@ impl Features {
         }
     }
 
-    /// The same for a path loop, whose rays wait in a queue where that serves.
-    pub fn with_queue(self, world: &World, parted: Option<&Parted>) -> Self {
-        // One walk takes the whole queue, and what lies outside its tree is met beforehand, without a loop. There is room for one shadow ray.
-        let fits = |p: &Parted| p.groups.len() == 1 && p.apart.len() <= BAKED_LIMIT;
-        let queued = parted.is_some_and(fits)
+    /// Whether the rays of a path loop should wait in a queue. One walk takes all of it, and what lies outside its tree is met beforehand,
+    /// without a loop. There is room for one shadow ray.
+    pub fn gains_by_queue(&self, world: &World, parted: &Parted) -> bool {
+        parted.groups.len() == 1
+            && parted.apart.len() <= BAKED_LIMIT
             && self.light_sampling
             && self.shadow_rays == 1
             && !self.has_implicit()
-            && visibility::rays_escape(world);
-        Self { queued, ..self }
+            && visibility::rays_escape(world)
     }
 
     pub fn has_material(&self, kind: MaterialKind) -> bool {

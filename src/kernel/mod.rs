@@ -63,12 +63,23 @@ pub struct LightKernel {
 
 /// Composes the kernel of `world` under `settings`; `access` overrides the rule of [`Access::choose`].
 pub fn compose(world: &World, settings: &Settings, access: Option<Access>) -> Kernel {
+    compose_with(world, settings, access, true)
+}
+
+/// The same. Without `queues` no ray waits in a queue, for tests that compare the two.
+pub(crate) fn compose_with(
+    world: &World,
+    settings: &Settings,
+    access: Option<Access>,
+    queues: bool,
+) -> Kernel {
     let access = access.unwrap_or_else(|| Access::choose(world));
     let aims = light_paths::aims(world, settings);
     let paths = (aims.as_ref()).map(|aims| LightPaths::new(world, settings, access, aims));
     let parted = (access == Access::Tree).then(|| Parted::new(world));
     let parted = parted.as_ref();
-    let features = Features::new(world, settings, access, paths).with_queue(world, parted);
+    let mut features = Features::new(world, settings, access, paths);
+    features.queued = queues && parted.is_some_and(|p| features.gains_by_queue(world, p));
     let light = aims.map(|aims| light_kernel(world, settings, &features, parted, aims));
     let mut wgsl = String::from("// Made for one scene by etendue.\n");
     append(&mut wgsl, &features, &modules::of_path(&features));

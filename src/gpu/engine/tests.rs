@@ -1,6 +1,7 @@
 use super::*;
+use crate::kernel::compose_with;
 use crate::scene::parse;
-use crate::settings::Overrides;
+use crate::settings::{Integrator, Overrides};
 
 fn engine() -> (GpuEngine, Film, Rect) {
     engine_with(str::to_owned)
@@ -63,11 +64,11 @@ fn a_tile_that_no_texture_holds_is_an_error() {
 
 #[test]
 fn samples_that_are_not_finite_are_left_out_and_counted_by_replicate() {
-    let add = "add_sample(&film, path.radiance, is_sample);";
+    let add = "add_sample(film, path.radiance, is_sample);";
     // One in every replicate's first round but the last's: samples 1, 5 and 9, and the same 256 later.
     let faulty = "var l = path.radiance;
         if film.s % 4u == 1u && film.s % 256u < 12u { l.y = bitcast<f32>(0x7f800000u | (film.s >> 31u)); }
-        add_sample(&film, l, is_sample);";
+        add_sample(film, l, is_sample);";
     let (mut engine, mut film, rect) = engine_with(|wgsl| {
         assert!(wgsl.contains(add));
         wgsl.replace(add, faulty)
@@ -116,6 +117,115 @@ fn counted(text: &str, trips: u64, samples: Range<u64>) -> Result<(Film, Counter
     let stop = AtomicBool::new(false);
     let counters = engine.render(&mut film, rect, samples, &stop)?;
     Ok((film, counters))
+}
+
+/// Scenes whose rays wait in a queue: spheres at random, matt or of three materials; with rows of glass ones, which are kept apart from each
+/// other; and with a light that the eye sees. And disks.
+fn queued_scenes() -> Vec<String> {
+    let cloud = crate::scene::generate::cloud(200, 3, "").scene;
+    let materials = "[material.gloss]
+type = \"phong\"
+exponent = 40.0
+diffuse = [0.3, 0.3, 0.3]
+specular = [0.5, 0.5, 0.5]
+[material.glass]
+type = \"dielectric\"
+ior = 1.5
+[material.mirror]
+type = \"mirror\"
+reflectance = [0.9, 0.9, 0.9]
+";
+    let of = ["matt", "gloss", "mirror"];
+    let mixed = (cloud.split("[[sphere]]").enumerate())
+        .map(|(i, part)| part.replace("\"matt\"", &format!("\"{}\"", of[i % 3])));
+    let mixed = mixed.collect::<Vec<_>>().join("[[sphere]]");
+    let mixed = mixed.replacen("[[plane]]", &format!("{materials}\n[[plane]]"), 1);
+    let mut glass = cloud.replacen("[[plane]]", &format!("{materials}\n[[plane]]"), 1);
+    for i in 0..120 {
+        let (x, z) = (
+            0.21 * f64::from(i % 11) - 1.05,
+            0.3 * f64::from(i / 11) - 4.0,
+        );
+        let sphere =
+            format!("\n[[sphere]]\ncenter = [{x}, 0.1, {z}]\nradius = 0.1\nmaterial = \"glass\"\n");
+        glass.push_str(&sphere);
+    }
+    let seen = cloud.replace("[0.0, 4.0, 1.0]", "[0.0, 1.9, 0.0]");
+    // Its tree holds lights too, some of which can block no other.
+    let mut disks = cloud.split("[[sphere]]").next().expect("a head").to_owned();
+    for i in 0..160 {
+        let at = |k: u32| 0.02 * f64::from((i * k) % 101) - 1.0;
+        let (kind, rest) = if i % 3 > 0 {
+            ("disk", "material = \"matt\"")
+        } else {
+            ("light", "radiance = [3.0, 3.0, 3.0]")
+        };
+        let center = format!("[{}, {}, {}]", at(37), 1.0 + at(53), at(71));
+        let disk = format!(
+            "\n[[{kind}]]\ncenter = {center}\nnormal = [{}, -1.0, 0.3]\nradius = 0.08\n{rest}\n",
+            at(7)
+        );
+        disks.push_str(&disk);
+    }
+    vec![cloud, mixed, glass, seen, disks]
+}
+
+/// 120 samples of 16 x 12 pixels in the open, whose rays wait in a queue or do not.
+fn in_the_open(text: &str, flags: Overrides, queues: bool, trips: u64) -> (Film, Counters) {
+    let scene = parse::parse_str("open.toml".as_ref(), text).expect("a scene");
+    let flags = Overrides {
+        size: Some([16, 12]),
+        ..flags
+    };
+    let settings = Settings::resolve(&scene, &flags);
+    let world = World::new(&scene, settings.size);
+    let kernel = compose_with(&world, &settings, None, queues);
+    assert_eq!(kernel.wgsl.contains("fn trace(queue"), queues);
+    let mut gpu = Gpu::open(&Choice::default()).expect("an adapter");
+    gpu.trip_limit = trips;
+    // SAFETY: it is what `compose_with` made.
+    let engine = unsafe { GpuEngine::with_kernel(gpu, &world, &settings, kernel) };
+    let mut engine = engine.expect("an engine");
+    let rect = Rect::whole([16, 12]);
+    let mut film = Film::new([16, 12], rect, settings.strata);
+    let stop = AtomicBool::new(false);
+    let mut counters = Counters::default();
+    for samples in [0..7, 7..8, 8..120] {
+        let more = engine.render(&mut film, rect, samples, &stop);
+        counters += more.expect("samples");
+    }
+    (film, counters)
+}
+
+#[test]
+fn rays_in_a_queue_give_the_bits_of_rays_one_by_one() {
+    for text in queued_scenes() {
+        for flags in [
+            Overrides::default(),
+            Overrides {
+                max_depth: Some(2),
+                strata: Some(1),
+                ..Overrides::default()
+            },
+            Overrides {
+                max_depth: Some(3),
+                strata: Some(3),
+                ..Overrides::default()
+            },
+            Overrides {
+                integrator: Some(Integrator::Whitted),
+                ..Overrides::default()
+            },
+        ] {
+            let alone = in_the_open(&text, flags.clone(), false, 60_000);
+            // A few paths use up the loop trips, or none does.
+            for trips in [60_000, 1_000] {
+                let queued = in_the_open(&text, flags.clone(), true, trips);
+                assert_eq!(queued.0, alone.0);
+                assert_eq!(queued.1, alone.1);
+            }
+        }
+    }
 }
 
 #[test]
