@@ -23,14 +23,6 @@ struct Ray {
     target_face: u32,
 }
 
-// Stands for every medium: opaque things that are met as if they were glass have it around them.
-const ANY_MEDIUM: u32 = 0xffffffffu;
-
-// Whether a ray is just outside a solid that lies in `parent`.
-fn is_outside(ray: Ray, parent: u32) -> bool {
-    return ray.medium == parent || parent == ANY_MEDIUM;
-}
-
 // The nearest hit so far: distance, and the key of what was met (4 x its number + the part met).
 struct Hit {
     t: f32,

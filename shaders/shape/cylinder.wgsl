@@ -117,14 +117,14 @@ fn cylinder_boundary(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top:
     let s = cylinder_span(ray, c, side, base, top);
     let inside = ray.medium == solid;
     let t = fmax(select(s.enter, s.leave, inside), 0.0);
-    let met = (inside && leaves(ray, s, base, top)) || (is_outside(ray, parent) && enters(ray, s, side, base, top));
+    let met = (inside && leaves(ray, s, base, top)) || (ray.medium == parent && enters(ray, s, side, base, top));
     return nearer(hit, met, t, key + select(enter_part(s), leave_part(s), inside));
 }
 
 // The same for shadow rays, if the solid holds no light: every ray that starts inside is blocked.
 fn cylinder_boundary_shadow(hit: Hit, ray: Ray, c: Cylinder, side: u32, base: u32, top: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let s = cylinder_span(ray, c, side, base, top);
-    let met = ray.medium == solid || (is_outside(ray, parent) && enters(ray, s, side, base, top) && s.enter < hit.t);
+    let met = ray.medium == solid || (ray.medium == parent && enters(ray, s, side, base, top) && s.enter < hit.t);
     return Hit(hit.t, select(hit.key, key, met));
 }
 

@@ -49,7 +49,7 @@ fn sphere_boundary(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u3
     let disc = s.radius * s.radius - dot(l, l);
     let root = safe_sqrt(disc);
     let on = ray.face == face;
-    let enters = is_outside(ray, parent) && disc >= 0.0 && b > 0.0 && !on;
+    let enters = ray.medium == parent && disc >= 0.0 && b > 0.0 && !on;
     let t = b + select(-root, select(root, b, on), inside);
     return nearer(hit, inside || enters, fmax(t, 0.0), key);
 }
@@ -57,6 +57,6 @@ fn sphere_boundary(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u3
 // The same for shadow rays, if the solid holds no light: every ray that starts inside is blocked.
 fn sphere_boundary_shadow(hit: Hit, ray: Ray, s: Sphere, face: u32, key: u32, solid: u32, parent: u32) -> Hit {
     let outside = sphere_shadow(hit, ray, s, face, key);
-    let met = ray.medium == solid || (is_outside(ray, parent) && outside.key != hit.key);
+    let met = ray.medium == solid || (ray.medium == parent && outside.key != hit.key);
     return Hit(hit.t, select(hit.key, key, met));
 }

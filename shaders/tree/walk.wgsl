@@ -65,6 +65,14 @@ fn slabs_of(ray: Ray) -> Slabs {
     return Slabs(1.0 / d, 1.2e-6 * (abs(ray.o.x) + abs(ray.o.y) + abs(ray.o.z)));
 }
 
+// The solid and the parent of an opaque thing in a tree of glass ones. It is met from any medium, and never from inside.
+const ANY_MEDIUM: u32 = 0xffffffffu;
+
+// The medium just outside a leaf, as seen by a ray.
+fn parent_of(leaf: u32, ray: Ray) -> u32 {
+    return select(leaf, ray.medium, leaf == ANY_MEDIUM);
+}
+
 fn is_node(a: vec4u) -> bool {
     return a.w >= NODE_MARK;
 }

@@ -239,13 +239,13 @@ fn walk(name: &str, group: &Group, function: Function, purpose: Purpose) -> Stri
     let field = |field: &str| match (field, group.function.shape) {
         ("faces.x", ShapeKind::Sphere) => "4u * i + 1u",
         ("solid", ShapeKind::Sphere) => "b.y",
-        ("parent", ShapeKind::Sphere) => "b.z",
+        ("parent", ShapeKind::Sphere) => "parent_of(b.z, ray)",
         ("faces.x", ShapeKind::Disk) => "c.y",
         ("faces.x", ShapeKind::Cylinder) => "c.x",
         ("faces.y", ShapeKind::Cylinder) => "c.y",
         ("faces.z", ShapeKind::Cylinder) => "c.z",
         ("solid", ShapeKind::Cylinder) => "d.y",
-        ("parent", ShapeKind::Cylinder) => "d.z",
+        ("parent", ShapeKind::Cylinder) => "parent_of(d.z, ray)",
         _ => unreachable!("leaves have no {field}"),
     };
     let call = function.call_with(hit, shape, |f| field(f).to_owned(), "4u * i");

@@ -60,7 +60,7 @@ fn put(records: &mut [[u32; 4]], unit: usize, what: &Unit) {
     records[UNIT * unit..][..UNIT].copy_from_slice(what);
 }
 
-/// The solid and its parent in the leaf of an opaque thing, which a ray meets in any medium: see `shaders/ray.wgsl`.
+/// The solid and its parent in the leaf of an opaque thing, which a ray meets in any medium: see `shaders/tree/walk.wgsl`.
 const ANY_MEDIUM: u32 = u32::MAX;
 
 /// A surface, its item in the words that its kind does not need.
