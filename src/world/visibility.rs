@@ -136,3 +136,58 @@ pub(crate) fn lights_overlap(world: &World) -> bool {
             overlap
         })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::parse::parse_str;
+
+    /// Whether rays escape from between planes, each a point in front of which it lies and its normal.
+    fn escape(planes: &[([f64; 3], [f64; 3])], more: &str) -> bool {
+        let mut text = "[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, -1]\nvfov = 40\nresolution = [8, 8]\n\
+             [material.white]\ntype = 'diffuse'\nreflectance = [0.5, 0.5, 0.5]\n\
+             [material.glass]\ntype = 'dielectric'\nior = 1.5\n"
+            .to_owned();
+        for (point, normal) in planes {
+            text += &format!(
+                "[[plane]]\npoint = {point:?}\nnormal = {normal:?}\nmaterial = 'white'\n"
+            );
+        }
+        let scene = parse_str("room.toml".as_ref(), &(text + more)).expect("a scene");
+        rays_escape(&World::new(&scene, [8, 8]))
+    }
+
+    /// A plane at distance 1 from the eye, which lies in this direction.
+    fn wall(towards: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+        (towards, towards.map(|x| -x))
+    }
+
+    #[test]
+    fn rays_escape_unless_walls_are_all_around() {
+        let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let [left, floor, back] = [x, y, z].map(|v| v.map(|c| -c));
+        let room = [x, y, z, left, floor, back].map(wall);
+        assert!(!escape(&room, ""));
+        // Without a wall; a tube; a gap between two planes; a floor; nothing but a ball.
+        assert!(escape(&room[1..], ""));
+        assert!(escape(&[x, y, left, floor].map(wall), ""));
+        assert!(escape(&[y, floor].map(wall), ""));
+        assert!(escape(&[floor].map(wall), ""));
+        let ball = |center: &str, material: &str| {
+            format!("[[sphere]]\ncenter = {center}\nradius = 1\nmaterial = '{material}'\n")
+        };
+        assert!(escape(&[], &ball("[0, 0, -3]", "white")));
+        assert!(escape(&[], &ball("[0, 0, 0]", "glass")));
+        assert!(!escape(&[], &ball("[0, 0, 0]", "white")));
+        // A tetrahedron, and three of its sides.
+        let sides = [
+            [0.5, 0.5, 0.5],
+            [0.5, -0.5, -0.5],
+            [-0.5, 0.5, -0.5],
+            [-0.5, -0.5, 0.5],
+        ]
+        .map(wall);
+        assert!(!escape(&sides, ""));
+        assert!(escape(&sides[1..], ""));
+    }
+}
