@@ -23,7 +23,17 @@ fn next_hit(path: ptr<function, Path>, pixel: Pixel, sight: Sight, film: ptr<fun
     let spare = camera_path(pixel, following, glances, sight);
     // After the last sample only its shadow ray is left.
     let wanted = sample < film.end;
-    let traced = trace(Queue(shadow_ray.ray, shadow_ray.distance, shadow_ray.waits, path.ray, wanted, spare, following < film.end));
+    let traced = trace(Queue(
+        shadow_ray.ray,
+        shadow_ray.distance,
+        shadow_ray.waits,
+        path.ray,
+        wanted,
+        path.depth == 1u,
+        spare,
+        following < film.end,
+        entry_of(pixel.place)
+    ));
     let lost = spend_trips(false);
 
     path.radiance += select(vec3f(0.0), shadow_ray.radiance, shadow_ray.waits & !traced.blocked);

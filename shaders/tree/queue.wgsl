@@ -28,9 +28,16 @@ fn trace(queue: Queue) -> Traced {
         var ray = either_ray(own.ray, shadow.ray, in_shadow);
         var slabs = either_slabs(own_slabs, slabs_of(shadow.ray), in_shadow);
         var hit = either_hit(own_hit, Hit(queue.distance - shadow.moved, NONE), in_shadow);
-        let own_root = select(0u, tree.x, queue.own_waits);
+        // Where they begin.
+        let root = vec4u(tree.x, 0u, 0u, 0u);
+        let from_eye = select(queue.entry, root, queue.entry.x == AT_ROOTS);
+        let own_start = select(vec4u(0u), select(root, from_eye, queue.own_from_eye), queue.own_waits);
+        // Neither ray from the eye can meet the tree.
+        let past = spare_waits & (own_start.x == 0u) & (own_hit.key == NONE);
         var walk: $walk_place;
-        walk.at = select(own_root, tree.x, in_shadow);
+        let start = select(own_start, root, in_shadow);
+        walk.at = start.x;
+        $begin
         while walk.at != 0u && trips_left > 0u {
             trips_left -= 1u;
             $walk_visit(ray, slabs, &walk, &hit);
@@ -43,12 +50,15 @@ fn trace(queue: Queue) -> Traced {
             ray = either_ray(either_ray(ray, own.ray, to_own), spare.ray, to_spare);
             slabs = either_slabs(either_slabs(slabs, own_slabs, to_own), spare_slabs, to_spare);
             hit = either_hit(either_hit(hit, own_hit, to_own), spare_hit, to_spare);
-            walk.at = select(select(walk.at, own_root, to_own), tree.x, to_spare);
-            // What lies beyond a 0 is never read.
-            walk.put_off_0 = select(walk.put_off_0, 0u, to_own | to_spare);
+            let again = select(own_start, from_eye, to_spare);
+            let begins = to_own | to_spare;
+            walk.at = select(walk.at, again.x, begins);
+            $again
             in_shadow = in_shadow & !to_own;
             in_spare = in_spare | to_spare;
         }
+        hit = either_hit(hit, spare_hit, past);
+        in_spare = in_spare | past;
         traced.passed = in_spare;
         traced.hit = either_hit(put_back(hit, own, traced.hit), put_back(hit, spare, spare_apart), in_spare);
     }

@@ -5,12 +5,15 @@ struct Queue {
     shadow: Ray,
     distance: f32,
     shadow_waits: bool,
-    // The path's own ray.
+    // The path's own ray, and whether it comes from the eye.
     own: Ray,
     own_waits: bool,
+    own_from_eye: bool,
     // The ray to be traced if the path's own meets nothing.
     spare: Ray,
     spare_waits: bool,
+    // Where rays from the eye begin, in this pixel: see `entry_of`.
+    entry: vec4u,
 }
 
 struct Traced {
@@ -19,6 +22,15 @@ struct Traced {
     blocked: bool,
     // The path's own ray has met nothing, and `hit` is the spare one's.
     passed: bool,
+}
+
+// Where the camera rays of a pixel begin their walks: a unit, or AT_ROOTS, and three words of what is put off. They can meet nothing else:
+// src/world/tree/beam.rs has found this out for a square of pixels.
+const AT_ROOTS: u32 = 0xffffffffu;
+
+fn entry_of(place: vec2u) -> vec4u {
+    let cell = place / CELL_SIDE;
+    return record(CELL_RECORDS + cell.y * CELLS_A_ROW + cell.x);
 }
 
 fn either_ray(a: Ray, b: Ray, second: bool) -> Ray {

@@ -144,7 +144,7 @@ impl GpuEngine {
             )));
         }
         tell(Making::Packing);
-        let packed = pack(world, kernel.access);
+        let packed = pack(world, kernel.access, kernel.cells.as_ref());
         let device = &gpu.device;
         let limits = device.limits();
         let problem = scene::too_large(&packed, world.surface_count(), &limits);

@@ -143,7 +143,7 @@ impl Probe {
             }),
         });
         let scene = (self.scene.as_ref().zip(world)).map(|((layout, access), world)| {
-            let packed = pack(world, *access);
+            let packed = pack(world, *access, None);
             scene::bind(gpu, layout, &packed, world)
         });
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

@@ -27,6 +27,7 @@ use crate::world::{World, light_tree};
 use features::{Features, constant};
 use light_paths::LightPaths;
 use modules::Module;
+use records::{Cells, Records};
 use std::fmt::Write as _;
 use trees::Parted;
 
@@ -42,6 +43,8 @@ pub struct Kernel {
     pub trips_per_sample: u64,
     /// The last vertex at which it looks for lights by extra camera rays, in pixels that the host marks; 0: it reads no marks.
     pub sight: u32,
+    /// Whose camera rays enter the tree at known places, if it asks for these.
+    pub(crate) cells: Option<Cells>,
     /// The kernel that traces light paths, if the scene has any use for them.
     pub light: Option<LightKernel>,
 }
@@ -92,6 +95,7 @@ pub(crate) fn compose_with(
         access,
         trips_per_sample: trips::per_sample(world, settings, &features),
         sight: features.sight,
+        cells: features.queued.then(|| Cells::new(settings.size)),
         light,
     }
 }
@@ -134,7 +138,9 @@ fn scene_text(
         constant(&mut s, "TRIPS_AT_VERTEX", "u32", format!("{vertex}u"));
     }
     if let Some(parted) = parted {
-        s.push_str(&records::Records::new(world, parted).constants(world));
+        let cells = features.queued.then(|| Cells::new(settings.size));
+        let records = Records::new(world, parted, cells.as_ref());
+        s.push_str(&records.constants(world, cells.as_ref()));
         if light_tree::serves(world.lights.len()) {
             let ends = light_tree::ends(world.lights.len());
             constant(&mut s, "LIGHT_CLUSTERS", "u32", format!("{ends}u"));

@@ -3,10 +3,55 @@
 use super::trees::{Parted, UNIT};
 use crate::world::World;
 use crate::world::light_tree::{LIGHTS_A_CLUSTER, ends, serves};
+use crate::world::tree::beam::Beam;
 use std::fmt::Write as _;
 
 /// Records of four words in a row of the texture.
 pub(crate) const RECORDS_A_ROW: u32 = 4096;
+
+/// Squares of pixels, whose camera rays enter a tree at the same places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Cells {
+    /// Pixels along a side.
+    pub side: u32,
+    /// Of the picture.
+    size: [u32; 2],
+}
+
+impl Cells {
+    /// Small ones, but not too many.
+    pub fn new(size: [u32; 2]) -> Self {
+        const MOST: usize = 1 << 17;
+        let of = |side| Self { side, size };
+        let sides = (2..16).map(|k| 1 << k);
+        sides
+            .map(of)
+            .find(|c| c.count() <= MOST)
+            .unwrap_or(of(1 << 16))
+    }
+
+    /// Along a row and a column.
+    pub fn along(&self) -> [u32; 2] {
+        self.size.map(|n| n.div_ceil(self.side))
+    }
+
+    /// All.
+    pub fn count(&self) -> usize {
+        let [columns, rows] = self.along().map(|n| n as usize);
+        columns * rows
+    }
+
+    /// The camera rays of every cell, row by row.
+    pub fn beams(&self, world: &World) -> impl Iterator<Item = Beam> {
+        let [columns, rows] = self.along();
+        let pixels = |k: u32, i: usize| {
+            let begin = k * self.side;
+            begin..(begin + self.side).min(self.size[i])
+        };
+        let beam = move |x, y| Beam::new(&world.camera, self.size, [pixels(x, 0), pixels(y, 1)]);
+        (0..rows).flat_map(move |y| (0..columns).map(move |x| beam(x, y)))
+    }
+}
 
 /// The number of the first record of each kind. The headers of trees begin at 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,13 +69,15 @@ pub(crate) struct Records {
     pub fours: usize,
     /// A word for each light.
     pub places: usize,
+    /// One for each of the [`Cells`], if there are any.
+    pub cells: usize,
     /// Trees: the rest.
     pub trees: usize,
 }
 
 impl Records {
-    /// Depends only on the numbers of surfaces, materials and lights.
-    pub fn new(world: &World, parted: &Parted) -> Self {
+    /// Depends only on the numbers of surfaces, materials and lights, and of cells.
+    pub fn new(world: &World, parted: &Parted, cells: Option<&Cells>) -> Self {
         let lights = world.lights.len();
         let ends = if serves(world.lights.len()) {
             ends(lights)
@@ -49,6 +96,7 @@ impl Records {
             } else {
                 0
             };
+        let cells_at = end_of_places.next_multiple_of(UNIT);
         Self {
             surfaces: surfaces_at,
             materials: materials_at,
@@ -56,23 +104,29 @@ impl Records {
             clusters,
             fours,
             places,
-            trees: end_of_places.next_multiple_of(UNIT),
+            cells: cells_at,
+            trees: (cells_at + cells.map_or(0, Cells::count)).next_multiple_of(UNIT),
         }
     }
 
     /// The constants of the shaders.
-    pub fn constants(&self, world: &World) -> String {
+    pub fn constants(&self, world: &World, cells: Option<&Cells>) -> String {
         let mut s = format!("const RECORDS_A_ROW: u32 = {RECORDS_A_ROW}u;\n");
         let mut constant = |name: &str, value: usize| {
-            let _ = writeln!(s, "const {name}_RECORDS: u32 = {value}u;");
+            let _ = writeln!(s, "const {name}: u32 = {value}u;");
         };
-        constant("SURFACE", self.surfaces);
-        constant("MATERIAL", self.materials);
-        constant("LIGHT", self.lights);
+        constant("SURFACE_RECORDS", self.surfaces);
+        constant("MATERIAL_RECORDS", self.materials);
+        constant("LIGHT_RECORDS", self.lights);
+        if let Some(cells) = cells {
+            constant("CELL_RECORDS", self.cells);
+            constant("CELL_SIDE", cells.side as usize);
+            constant("CELLS_A_ROW", cells.along()[0] as usize);
+        }
         if serves(world.lights.len()) {
-            constant("CLUSTER", self.clusters);
-            constant("FOUR", self.fours);
-            constant("PLACE", self.places);
+            constant("CLUSTER_RECORDS", self.clusters);
+            constant("FOUR_RECORDS", self.fours);
+            constant("PLACE_RECORDS", self.places);
         }
         s
     }

@@ -9,6 +9,7 @@ use super::emit::surfaces::{Function, Target, Variant, for_shadows, targets};
 use super::layout::ShapeKind;
 use super::modules::{DESCENT, LEAF_CYLINDER, LEAF_DISK, LEAF_SPHERE, Module, QUEUE, VISIT};
 use super::preprocess::fill;
+use crate::world::tree::beam::GROUPS;
 use crate::world::{Bounds, Geometry, Tree, World, WorldPrimitive};
 use glam::DVec3;
 use std::fmt::Write as _;
@@ -250,9 +251,27 @@ fn walk(name: &str, group: &Group, function: Function, purpose: Purpose) -> Stri
     };
     let call = function.call_with(hit, shape, |f| field(f).to_owned(), "4u * i");
     // A walk through a tree of one thing puts nothing off, but has a place for it.
-    let words = Tree::levels(group.numbers.len()).max(1);
+    let words = match purpose {
+        Purpose::Queue => Tree::levels(group.numbers.len()).max(GROUPS as u32),
+        _ => Tree::levels(group.numbers.len()).max(1),
+    };
     let declared: String = (0..words)
         .map(|k| format!("put_off_{k}: u32,\n    "))
+        .collect();
+    // What lies beyond a 0 is never read.
+    let start = |k: u32, of: &str| match ["y", "z", "w"].get(k as usize) {
+        Some(component) => format!("{of}.{component}"),
+        None => "0u".to_owned(),
+    };
+    let first_words = || 0..words.min(GROUPS as u32 + 1);
+    let begin: String = first_words()
+        .map(|k| format!("walk.put_off_{k} = {};\n        ", start(k, "start")))
+        .collect();
+    let again: String = first_words()
+        .map(|k| {
+            let word = start(k, "again");
+            format!("walk.put_off_{k} = select(walk.put_off_{k}, {word}, begins);\n            ")
+        })
         .collect();
     let (header, shift) = (format!("{}u", group.header), shift(words));
     let (goes_on, keep, walk) = match purpose {
@@ -270,6 +289,8 @@ fn walk(name: &str, group: &Group, function: Function, purpose: Purpose) -> Stri
         ("keep", &keep),
         ("words", declared.trim_end()),
         ("shift", shift.trim_end()),
+        ("begin", begin.trim_end()),
+        ("again", again.trim_end()),
     ];
     [leaf, VISIT, walk]
         .map(|template| fill(template.text, &values) + "\n")

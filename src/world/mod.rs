@@ -23,7 +23,7 @@ mod media;
 pub(crate) mod near_light;
 mod origin;
 pub mod trace;
-mod tree;
+pub(crate) mod tree;
 pub(crate) mod visibility;
 
 pub use bounds::Bounds;

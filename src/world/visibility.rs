@@ -144,14 +144,14 @@ mod tests {
 
     /// Whether rays escape from between planes, each a point in front of which it lies and its normal.
     fn escape(planes: &[([f64; 3], [f64; 3])], more: &str) -> bool {
-        let mut text = "[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, -1]\nvfov = 40\nresolution = [8, 8]\n\
+        let mut text =
+            "[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, -1]\nvfov = 40\nresolution = [8, 8]\n\
              [material.white]\ntype = 'diffuse'\nreflectance = [0.5, 0.5, 0.5]\n\
              [material.glass]\ntype = 'dielectric'\nior = 1.5\n"
-            .to_owned();
+                .to_owned();
         for (point, normal) in planes {
-            text += &format!(
-                "[[plane]]\npoint = {point:?}\nnormal = {normal:?}\nmaterial = 'white'\n"
-            );
+            text +=
+                &format!("[[plane]]\npoint = {point:?}\nnormal = {normal:?}\nmaterial = 'white'\n");
         }
         let scene = parse_str("room.toml".as_ref(), &(text + more)).expect("a scene");
         rays_escape(&World::new(&scene, [8, 8]))

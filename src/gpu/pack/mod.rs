@@ -4,7 +4,7 @@ mod trees;
 
 use crate::kernel::Access;
 use crate::kernel::layout::{DiskLight, LightCluster, Material, Surface, single};
-use crate::kernel::records::{RECORDS_A_ROW, Records};
+use crate::kernel::records::{Cells, RECORDS_A_ROW, Records};
 use crate::kernel::trees::Parted;
 use crate::world::World;
 use crate::world::light_tree::{self, LightTree};
@@ -85,14 +85,14 @@ fn pack_lights(world: &World) -> Vec<[u32; 4]> {
 }
 
 /// Everything for a kernel with trees.
-fn pack_records(world: &World) -> Vec<[u32; 4]> {
+fn pack_records(world: &World, cells: Option<&Cells>) -> Vec<[u32; 4]> {
     let Buffers {
         surfaces,
         materials,
         lights,
     } = Buffers::new(world);
     let parted = Parted::new(world);
-    let at = Records::new(world, &parted);
+    let at = Records::new(world, &parted, cells);
     let row = RECORDS_A_ROW as usize;
     // Headers are filled in when their trees are built.
     let mut records = vec![[0; 4]; at.surfaces];
@@ -106,18 +106,24 @@ fn pack_records(world: &World) -> Vec<[u32; 4]> {
         records.extend(pack_lights(world));
     }
     records.resize(at.trees, [0; 4]);
-    trees::append(&mut records, world, &parted, &surfaces);
+    trees::append(
+        &mut records,
+        world,
+        &parted,
+        &surfaces,
+        cells.map(|c| (c, at.cells)),
+    );
     if records.len() > row {
         records.resize(records.len().next_multiple_of(row), [0; 4]);
     }
     records
 }
 
-/// Packs a world for kernels of this kind.
-pub fn pack(world: &World, access: Access) -> Packed {
+/// Packs a world for kernels of this kind, with the places where the camera rays of `cells` enter its tree.
+pub(crate) fn pack(world: &World, access: Access, cells: Option<&Cells>) -> Packed {
     match access {
         Access::Baked => Packed::Baked,
         Access::Buffers => Packed::Buffers(Buffers::new(world).or_defaults()),
-        Access::Tree => Packed::Records(pack_records(world)),
+        Access::Tree => Packed::Records(pack_records(world, cells)),
     }
 }

@@ -1,7 +1,9 @@
 //! Trees as records: see `shaders/tree/walk.wgsl`.
 
 use crate::kernel::layout::{ShapeKind, Surface};
+use crate::kernel::records::Cells;
 use crate::kernel::trees::{Parted, UNIT, boxes};
+use crate::world::tree::beam::Entry;
 use crate::world::{AIR, Below, Box32, Tree, World, visibility};
 
 /// A node, a leaf or a header.
@@ -11,12 +13,13 @@ type Unit = [[u32; 4]; UNIT];
 const NODE: u32 = 1 << 31;
 
 /// Appends the trees of every group, and fills in the units before all records, of which the first is where walks end and the others
-/// are headers.
+/// are headers, and the records of `cells` from a place on.
 pub(super) fn append(
     records: &mut Vec<[u32; 4]>,
     world: &World,
     parted: &Parted,
     surfaces: &[Surface],
+    cells: Option<(&Cells, usize)>,
 ) {
     put(records, 0, &node(&[], 0));
     let blocks = visibility::blockers(world);
@@ -53,7 +56,35 @@ pub(super) fn append(
             put(records, header, &[around, links, [0; 4], [0; 4]]);
             header = next;
         }
+        if let Some((cells, at)) = cells {
+            // Of several trees each is walked from its root.
+            let root = (records.len() - UNIT * trees[0].nodes.len()) / UNIT;
+            let entries = cells.beams(world).map(|beam| match &trees[..] {
+                [tree] => entry(&tree.entry(&beam), root as u32),
+                _ => AT_ROOTS,
+            });
+            for (record, entry) in records[at..].iter_mut().zip(entries) {
+                *record = entry;
+            }
+        }
     }
+}
+
+/// The record of a cell whose rays begin at the roots of the trees.
+const AT_ROOTS: [u32; 4] = [u32::MAX, 0, 0, 0];
+
+/// The record of a cell: a unit, and what is put off as `put_off` of `shaders/tree/walk.wgsl` does it. The tree stands from unit `root` on.
+fn entry(entry: &Entry, root: u32) -> [u32; 4] {
+    let mut record = [0; 4];
+    record[0] = entry.at.map_or(0, |at| root + at);
+    for (word, group) in record[1..].iter_mut().zip(&entry.put_off) {
+        let numbers = group
+            .places
+            .iter()
+            .rfold(1, |word, place| word << 2 | place);
+        *word = (root + group.first) << 7 | numbers;
+    }
+    record
 }
 
 fn put(records: &mut [[u32; 4]], unit: usize, what: &Unit) {

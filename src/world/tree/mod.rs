@@ -4,6 +4,7 @@
 //! pairs of boxes that are nearest to each other. The crate `bvh` brings its own linear algebra, and was not tried. Neither bounds the
 //! depth of a tree, on which the room for a walk's stack depends.
 
+pub(crate) mod beam;
 mod build;
 mod forest;
 
