@@ -217,10 +217,10 @@ fn rays_in_a_queue_give_the_bits_of_rays_one_by_one() {
                 ..Overrides::default()
             },
         ] {
-            let alone = in_the_open(&text, flags.clone(), false, 60_000);
+            let alone = in_the_open(&text, flags, false, 60_000);
             // A few paths use up the loop trips, or none does.
             for trips in [60_000, 1_000] {
-                let queued = in_the_open(&text, flags.clone(), true, trips);
+                let queued = in_the_open(&text, flags, true, trips);
                 assert_eq!(queued.0, alone.0);
                 assert_eq!(queued.1, alone.1);
             }

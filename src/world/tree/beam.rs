@@ -85,9 +85,6 @@ impl Beam {
     }
 }
 
-/// A group on the way, and how deep its nodes lie.
-type Open = (Group, u32);
-
 impl Tree {
     /// Where the rays of `beam` enter it. The room for a walk's stack suffices from there: a node at depth k comes with at most k groups.
     pub(crate) fn entry(&self, beam: &Beam) -> Entry {
@@ -97,8 +94,8 @@ impl Tree {
         if beam.enters(&root.bounds).is_none() {
             return Entry::default();
         }
-        let (mut at, mut depth) = (0, 0);
-        let mut open: Vec<Open> = Vec::new();
+        let mut at = 0;
+        let mut open: Vec<Group> = Vec::new();
         loop {
             let Some(met) = self.children_met(beam, at) else {
                 // A leaf. What comes after it may still be looked at closely.
@@ -109,16 +106,14 @@ impl Tree {
             };
             match met.places.len() {
                 0 => match next_of(&mut open) {
-                    Some(next) => (at, depth) = next,
+                    Some(next) => at = next,
                     None => return Entry::default(),
                 },
                 n if n == 1 || open.len() < GROUPS => {
-                    debug_assert!(open.len() <= depth as usize);
-                    depth += 1;
                     at = met.first + met.places[0];
                     let places = met.places[1..].to_vec();
                     if !places.is_empty() {
-                        open.push((Group { places, ..met }, depth));
+                        open.push(Group { places, ..met });
                     }
                 }
                 _ if self.look_closely(beam, &mut open) => {}
@@ -127,7 +122,7 @@ impl Tree {
         }
         Entry {
             at: Some(at),
-            put_off: open.into_iter().rev().map(|o| o.0).collect(),
+            put_off: open.into_iter().rev().collect(),
         }
     }
 
@@ -146,16 +141,15 @@ impl Tree {
     }
 
     /// Puts the children in the place of groups of one node. Whether anything has changed.
-    fn look_closely(&self, beam: &Beam, open: &mut Vec<Open>) -> bool {
+    fn look_closely(&self, beam: &Beam, open: &mut Vec<Group>) -> bool {
         let mut changed = false;
-        open.retain_mut(|(group, depth)| {
+        open.retain_mut(|group| {
             if let [place] = group.places[..]
                 && let Some(met) = self.children_met(beam, group.first + place)
                 && met.places.len() < WIDTH
             {
                 changed = true;
                 *group = met;
-                *depth += 1;
             }
             !group.places.is_empty()
         });
@@ -163,10 +157,10 @@ impl Tree {
     }
 }
 
-/// Takes the next node away, with its depth.
-fn next_of(open: &mut Vec<Open>) -> Option<(u32, u32)> {
-    let (group, depth) = open.last_mut()?;
-    let next = (group.first + group.places.remove(0), *depth);
+/// Takes the next node away.
+fn next_of(open: &mut Vec<Group>) -> Option<u32> {
+    let group = open.last_mut()?;
+    let next = group.first + group.places.remove(0);
     if group.places.is_empty() {
         open.pop();
     }
@@ -216,6 +210,7 @@ mod tests {
     fn reached(tree: &Tree, entry: &Entry, depths: &[u32]) -> Vec<u32> {
         let mut open: Vec<u32> = entry.at.into_iter().collect();
         let mut below = entry.put_off.len();
+        assert!(below <= GROUPS);
         for at in &open {
             assert!(below <= depths[*at as usize] as usize);
         }
