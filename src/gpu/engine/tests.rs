@@ -120,7 +120,8 @@ fn counted(text: &str, trips: u64, samples: Range<u64>) -> Result<(Film, Counter
 }
 
 /// Scenes whose rays wait in a queue: spheres at random, matt or of three materials; with rows of glass ones, which are kept apart from each
-/// other; and with a light that the eye sees. And disks.
+/// other; and with a light that the eye sees; disks; and a
+/// crowd among large things.
 fn queued_scenes() -> Vec<String> {
     let cloud = crate::scene::generate::cloud(200, 3, "").scene;
     let materials = "[material.gloss]
@@ -167,7 +168,21 @@ reflectance = [0.9, 0.9, 0.9]
         );
         disks.push_str(&disk);
     }
-    vec![cloud, mixed, glass, seen, disks]
+    // The crowd in the middle has a tree of its own.
+    let mut wide = cloud.clone();
+    for i in 0..300 {
+        let at = |k: u32| 20.0 * f64::from((i * k) % 307) - 3000.0;
+        let center = format!(
+            "[{}, {}, {}]",
+            at(37),
+            1010.0 + 0.3 * at(53),
+            at(71) - 3300.0
+        );
+        wide.push_str(&format!(
+            "\n[[sphere]]\ncenter = {center}\nradius = 60\nmaterial = \"matt\"\n"
+        ));
+    }
+    vec![cloud, mixed, glass, seen, disks, wide]
 }
 
 /// 120 samples of 16 x 12 pixels in the open, whose rays wait in a queue or do not.
