@@ -89,7 +89,7 @@ fn compose_buffers(bencher: Bencher, name: &str) {
 #[divan::bench(args = SCENES)]
 fn pack_buffers(bencher: Bencher, name: &str) {
     let (.., world) = scene(name);
-    bencher.bench(|| pack(black_box(&world), Access::choose(&world)));
+    bencher.bench(|| pack(black_box(&world), Access::choose(&world), None));
 }
 
 /// A block of 512 x 384 pixels, in two parts: what is unfinished, and what is folded into f64.

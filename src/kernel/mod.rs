@@ -27,7 +27,8 @@ use crate::world::{World, light_tree};
 use features::{Features, constant};
 use light_paths::LightPaths;
 use modules::Module;
-use records::{Cells, Records};
+pub use records::Cells;
+use records::Records;
 use std::fmt::Write as _;
 use trees::Parted;
 
@@ -43,8 +44,8 @@ pub struct Kernel {
     pub trips_per_sample: u64,
     /// The last vertex at which it looks for lights by extra camera rays, in pixels that the host marks; 0: it reads no marks.
     pub sight: u32,
-    /// Whose camera rays enter the tree at known places, if it asks for these.
-    pub(crate) cells: Option<Cells>,
+    /// For which squares of pixels it asks where their camera rays enter the tree, if for any.
+    pub cells: Option<Cells>,
     /// The kernel that traces light paths, if the scene has any use for them.
     pub light: Option<LightKernel>,
 }

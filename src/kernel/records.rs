@@ -9,9 +9,9 @@ use std::fmt::Write as _;
 /// Records of four words in a row of the texture.
 pub(crate) const RECORDS_A_ROW: u32 = 4096;
 
-/// Squares of pixels, whose camera rays enter a tree at the same places.
+/// The squares of pixels of a picture for each of which it is known where its camera rays enter a tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Cells {
+pub struct Cells {
     /// Pixels along a side.
     pub side: u32,
     /// Of the picture.
@@ -19,7 +19,7 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// Small ones, but not too many.
+    /// Those of a picture of `size` pixels: small ones, but not too many.
     pub fn new(size: [u32; 2]) -> Self {
         const MOST: usize = 1 << 17;
         let of = |side| Self { side, size };
@@ -42,7 +42,7 @@ impl Cells {
     }
 
     /// The camera rays of every cell, row by row.
-    pub fn beams(&self, world: &World) -> impl Iterator<Item = Beam> {
+    pub(crate) fn beams(&self, world: &World) -> impl Iterator<Item = Beam> {
         let [columns, rows] = self.along();
         let pixels = |k: u32, i: usize| {
             let begin = k * self.side;

@@ -147,7 +147,8 @@ mod tests {
         let mut text =
             "[camera]\neye = [0, 0, 0]\nlook_at = [0, 0, -1]\nvfov = 40\nresolution = [8, 8]\n\
              [material.white]\ntype = 'diffuse'\nreflectance = [0.5, 0.5, 0.5]\n\
-             [material.glass]\ntype = 'dielectric'\nior = 1.5\n"
+             [material.glass]\ntype = 'dielectric'\nior = 1.5\n\
+             [[light]]\ncenter = [0, 0, -0.5]\nnormal = [0, 1, 0]\nradius = 0.1\nradiance = [1, 1, 1]\n"
                 .to_owned();
         for (point, normal) in planes {
             text +=

@@ -2,10 +2,10 @@
 
 mod trees;
 
-use crate::kernel::Access;
 use crate::kernel::layout::{DiskLight, LightCluster, Material, Surface, single};
-use crate::kernel::records::{Cells, RECORDS_A_ROW, Records};
+use crate::kernel::records::{RECORDS_A_ROW, Records};
 use crate::kernel::trees::Parted;
+use crate::kernel::{Access, Cells};
 use crate::world::World;
 use crate::world::light_tree::{self, LightTree};
 
@@ -120,7 +120,7 @@ fn pack_records(world: &World, cells: Option<&Cells>) -> Vec<[u32; 4]> {
 }
 
 /// Packs a world for kernels of this kind, with the places where the camera rays of `cells` enter its tree.
-pub(crate) fn pack(world: &World, access: Access, cells: Option<&Cells>) -> Packed {
+pub fn pack(world: &World, access: Access, cells: Option<&Cells>) -> Packed {
     match access {
         Access::Baked => Packed::Baked,
         Access::Buffers => Packed::Buffers(Buffers::new(world).or_defaults()),

@@ -1,7 +1,7 @@
 //! Trees as records: see `shaders/tree/walk.wgsl`.
 
+use crate::kernel::Cells;
 use crate::kernel::layout::{ShapeKind, Surface};
-use crate::kernel::records::Cells;
 use crate::kernel::trees::{Parted, UNIT, boxes};
 use crate::world::tree::beam::Entry;
 use crate::world::{AIR, Below, Box32, Tree, World, visibility};
