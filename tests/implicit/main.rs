@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod cubics;
+mod judge;
 mod pictures;
 mod rays;
 mod rounded;

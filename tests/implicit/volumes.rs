@@ -1,7 +1,8 @@
 //! Isosurfaces of volumes: what the kernels meet against the f64 reference, which goes through every cell; and against spheres, whose
 //! distance a volume may hold.
 
-use super::rays::{failures_of, shoot};
+use super::judge::failures_of;
+use super::rays::shoot;
 use crate::common::{gpu, settings};
 use etendue::gpu::probe::Uniform;
 use etendue::world::World;
