@@ -6,11 +6,6 @@ fn next_hit(path: ptr<function, Path>, pixel: Pixel, sight: Sight, film: ptr<fun
     return intersect(path.ray);
 }
 
-// Whether a shadow ray reaches its light.
-fn is_lit(shadow: Ray, distance: f32, light: u32) -> bool {
-    return !occluded(shadow, distance, light);
-}
-
 // Adds direct light to the path's radiance, if it `counts`.
 fn gather(path: ptr<function, Path>, direct: vec3f, counts: bool) {
     path.radiance += select(vec3f(0.0), direct, counts);

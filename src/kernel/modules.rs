@@ -81,6 +81,7 @@ modules! {
     FILM = "film",
     SCATTER = "scatter",
     RAYS_ONE_BY_ONE = "rays/one_by_one",
+    RAYS_LIT = "rays/lit",
     RAYS_QUEUED = "rays/queued",
     EMISSION = "light/emission",
     DIRECT_NONE = "direct/none",
@@ -146,6 +147,7 @@ pub(super) fn of_path(f: &Features) -> Vec<Module> {
             }
         }
     }
+    modules.extend((f.light_sampling && !f.queued).then_some(RAYS_LIT));
     modules.extend(match (f.light_sampling, f.shadow_rays) {
         (false, _) => vec![DIRECT_NONE],
         (true, 1) => vec![DIRECT_SAMPLED, DIRECT_ONE],
