@@ -7,8 +7,8 @@ use etendue::gpu::probe::{Probe, Uniform, Values};
 use etendue::gpu::{Choice, Gpu};
 use etendue::implicit::Implicit;
 use etendue::kernel::{Access, scene_probe_source};
-use etendue::world::trace::{Met, Ray};
 use etendue::world::World;
+use etendue::world::trace::{Met, Ray};
 use glam::DVec3;
 use std::sync::LazyLock;
 
