@@ -23,7 +23,8 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
     let receiver = receiver_at(&x);
     let direct = direct_light_if(goes_on & !specular, &x, receiver, key, u, path.depth, film);
     // Not even zero is added where nothing is asked: beta may have left f32.
-    gather(path, path.beta * (direct.radiance * light_scale(x.medium)), goes_on & !specular);
+    let gathered = path.beta * (direct.radiance * light_scale(x.medium));
+    gather(path, gathered, goes_on & !specular);
     path.only_lights = path.only_lights | (WHITTED & !specular);
 
     // A new direction.
