@@ -10,22 +10,25 @@ use crate::world::aims::Aims;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-/// Pixels for each light path of a pass. With 8 and 16 the efficiency of caustic, three_materials and cylinders was the same within 6 %; with 4
-/// it was 0.9 times as high, with 32 0.9 to 1.0 times. Fewer are better only while other noise remains.
-const PIXELS_A_PATH: u32 = 8;
+/// Light paths of a pass for each pixel, at least and where mirrors and glass get all of the light. In between it is in proportion to the root
+/// of what they get. By squared error and CPU time the best numbers were 1/64 and fewer where they get 0.2 to 2 % of the light (clouds
+/// with a sixteenth of glass, torus), 1/16 to 1/8 for 7 to 30 % (caustic, three_materials, cylinders), and 1/4 to 1/2 for all of it (lamps in
+/// glass); half as many or twice as many had at least 0.8 times the best efficiency.
+const PATHS_A_PIXEL: [f64; 2] = [1.0 / 64.0, 1.0 / 4.0];
 
 /// The fewest and the most light paths of a pass. A small region needs all of them, however large the picture is.
-const LIMITS: [u32; 2] = [64, 1 << 18];
+const LIMITS: [f64; 2] = [64.0, 262_144.0];
 
 /// The most pairs that stand in a kernel's text. Every turn of the path loop looks a pair up, and a load from a buffer would cost it more
 /// than so many selections.
 const MOST_IN_TEXT: usize = 24;
 
 /// Light paths of a pass, which goes with one sample of every pixel of a picture of this size.
-pub(super) fn photons(size: [u32; 2]) -> u32 {
-    let [fewest, most] = LIMITS;
-    let wanted = size[0].saturating_mul(size[1]).div_ceil(PIXELS_A_PATH);
-    wanted.clamp(fewest, most)
+pub(super) fn photons(aims: &Aims, size: [u32; 2]) -> u32 {
+    let pixels = f64::from(size[0]) * f64::from(size[1]);
+    let [least, most] = PATHS_A_PIXEL;
+    let a_pixel = (most * aims.share.sqrt()).clamp(least, most);
+    (pixels * a_pixel).ceil().clamp(LIMITS[0], LIMITS[1]) as u32
 }
 
 /// The pairs of lights and specular surfaces, if the picture has light paths. The shortest has two vertices, and the light is a third.
@@ -55,7 +58,7 @@ impl LightPaths {
     pub fn new(world: &World, settings: &Settings, access: Access, aims: &Aims) -> Self {
         let pairs = aims.cumulative.len();
         Self {
-            photons: photons(settings.size),
+            photons: photons(aims, settings.size),
             aims: aims.targets.len(),
             pairs,
             surfaces: world.surface_count(),

@@ -116,8 +116,8 @@ fn light_kernel(
     wgsl.push_str(&emit::lights::medium(world));
     LightKernel {
         wgsl,
+        photons: light_paths::photons(&aims, settings.size),
         aims,
-        photons: light_paths::photons(settings.size),
         trips_per_path: trips::per_light_path(world, settings, &own),
         aims_bound: features.light_paths.as_ref().is_some_and(|p| !p.in_text),
     }

@@ -42,6 +42,8 @@ pub(crate) struct Aims {
     pub targets: Vec<Target>,
     /// Sums of the probabilities of the pairs so far, each pair's own included, times 2^24.
     pub cumulative: Vec<u32>,
+    /// The light that the surfaces get, over all that the lights send out. Surfaces behind others count too, so it may be above 1.
+    pub share: f64,
 }
 
 impl Aims {
@@ -97,6 +99,7 @@ impl Aims {
         Some(Self {
             targets,
             cumulative,
+            share: all / world.lights.iter().map(power).sum::<f64>(),
         })
     }
 
@@ -152,6 +155,11 @@ fn target(number: usize, geometry: &Geometry) -> Target {
     }
 }
 
+/// The light that a light sends out.
+fn power(l: &WorldLight) -> f64 {
+    luminance(l.radiance.to_array()) * PI * l.radius * l.radius * PI
+}
+
 /// An estimate of the light that a specular surface gets from a light, and sends on: the mean over some points of the light.
 fn flux(world: &World, l: &WorldLight, t: &Target) -> f64 {
     let p = &world.primitives[t.number - world.lights.len()];
@@ -183,7 +191,7 @@ fn flux(world: &World, l: &WorldLight, t: &Target) -> f64 {
         solid_angle * cos.clamp(0.0, 1.0)
     };
     let mean = points.map(to_target).iter().sum::<f64>() / points.len() as f64;
-    passed * luminance(l.radiance.to_array()) * PI * l.radius * l.radius * mean
+    passed * power(l) * mean / PI
 }
 
 #[cfg(test)]
@@ -229,6 +237,20 @@ mod tests {
             p.iter().any(|p| *p > 0.8) && p.iter().all(|p| *p > 0.05),
             "{p:?}"
         );
+    }
+
+    #[test]
+    fn the_share_of_the_light_is_that_of_solid_angles() {
+        let share = |things: &str| aims(&(light("[0, 2, 0]") + things)).expect("aims").share;
+        // Straight below a small light, a ball gets the squared sine of half its angle.
+        let below = share(&ball("[0, -0.5, 0]", 0.25));
+        assert!((below - 0.01).abs() < 1e-3, "{below}");
+        let inside = share(&ball("[0, 2, 0]", 1.0));
+        assert!((inside - 1.0).abs() < 1e-12, "all of it: {inside}");
+        let mirror = "[material.silver]\ntype = 'mirror'\nreflectance = [0.5, 0.5, 0.5]\n\
+             [[plane]]\npoint = [-5, 0, 0]\nnormal = [1, 0, 0]\nmaterial = 'silver'\n";
+        let beside = share(mirror);
+        assert!((beside - 0.25).abs() < 1e-3, "half of half of it: {beside}");
     }
 
     #[test]
