@@ -5,6 +5,7 @@ use super::pack::pack;
 use super::{Gpu, scene};
 use crate::kernel::{Access, ProbeFeatures, probe_source};
 use crate::world::World;
+use glam::DVec3;
 use wgpu::util::DeviceExt as _;
 
 /// Numbers in and out of one invocation.
@@ -30,6 +31,11 @@ impl Uniform {
     /// The next, in [a, b).
     pub fn between(&mut self, a: f64, b: f64) -> f64 {
         a + (b - a) * self.next()
+    }
+
+    /// The next three, each in [-1, 1).
+    pub fn vector(&mut self) -> DVec3 {
+        DVec3::from_array([(); 3].map(|()| self.between(-1.0, 1.0)))
     }
 }
 

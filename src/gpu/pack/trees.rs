@@ -196,23 +196,9 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::probe::Uniform;
     use crate::world::Bounds;
     use glam::DVec3;
-
-    /// Numbers between 0 and 1, the same every time.
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005) + 1_442_695_040_888_963_407;
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
-        }
-
-        fn vector(&mut self) -> DVec3 {
-            let mut next = || 2.0 * self.next() - 1.0;
-            DVec3::new(next(), next(), next())
-        }
-    }
 
     /// What a walk reads of a node: the step, and the least and the greatest coordinate of a child, by axis. Without rounding.
     fn read(unit: &Unit, child: usize) -> [[f64; 3]; 3] {
@@ -228,12 +214,12 @@ mod tests {
     }
 
     /// Boxes of one to four children, about as large as `size`, around a point `offset` away from the origin.
-    fn families(size: f64, offset: f64, numbers: &mut Numbers) -> Vec<Vec<Bounds>> {
+    fn families(size: f64, offset: f64, numbers: &mut Uniform) -> Vec<Vec<Bounds>> {
         let middle = offset * numbers.vector();
         let ball = |at: DVec3, r: f64| Bounds::about(middle + at, DVec3::splat(r));
         let mut all = Vec::new();
         for count in 1..=4 {
-            let mut some = |of: &mut dyn FnMut(&mut Numbers, usize) -> Bounds| {
+            let mut some = |of: &mut dyn FnMut(&mut Uniform, usize) -> Bounds| {
                 all.push((0..count).map(|i| of(numbers, i)).collect());
             };
             // Of all sizes, equal ones, the same one, points, one point.
@@ -266,7 +252,7 @@ mod tests {
     fn a_node_holds_its_children_in_all_sizes_and_places() {
         // What a walk's rounding errors come to, in parts of the greatest coordinate: see `Grid::new`.
         const ERRORS: f64 = 7.0 / (1 << 24) as f64;
-        let mut numbers = Numbers(1);
+        let mut numbers = Uniform(1);
         let scales = || (-6..=6).step_by(2).map(|e| 10f64.powi(e));
         for (size, offset) in scales().flat_map(|s| {
             std::iter::once(0.0)

@@ -170,22 +170,9 @@ fn next_of(open: &mut Vec<Group>) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::probe::Uniform;
     use crate::world::{AIR, Bounds};
     use glam::DVec3;
-
-    /// Numbers between -1 and 1, the same every time.
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005) + 1_442_695_040_888_963_407;
-            (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-
-        fn vector(&mut self) -> DVec3 {
-            DVec3::from_array([0; 3].map(|_| self.next()))
-        }
-    }
 
     fn camera(eye: DVec3, to: DVec3, pixel: f64) -> WorldCamera {
         let forward = (to - eye).normalize();
@@ -247,7 +234,7 @@ mod tests {
 
     #[test]
     fn a_walk_from_an_entry_meets_what_a_walk_from_the_root_meets() {
-        let mut n = Numbers(7);
+        let mut n = Uniform(7);
         let (mut all, mut left, mut nothing) = (0, 0, 0);
         for count in [1, 2, 5, 60, 1000, 20_000] {
             let radius = 0.5 / f64::from(count).sqrt();
@@ -274,8 +261,8 @@ mod tests {
                 };
                 let camera = camera(eye, to, [1e-3, 0.1, 1e-5][k % 3]);
                 let size = [640, 480];
-                let x = (320.0 + 300.0 * n.next()) as u32;
-                let y = (240.0 + 200.0 * n.next()) as u32;
+                let x = n.between(20.0, 620.0) as u32;
+                let y = n.between(40.0, 440.0) as u32;
                 let beam = Beam::new(&camera, size, [x..x + 4, y..y + 4]);
                 let entry = tree.entry(&beam);
                 let found = reached(&tree, &entry, &depths);
@@ -283,7 +270,7 @@ mod tests {
                 left += found.len();
                 nothing += usize::from(entry.at.is_none());
                 for _ in 0..50 {
-                    let [u, v] = [0; 2].map(|_| 2.0 + 2.0 * n.next());
+                    let [u, v] = [0; 2].map(|_| n.between(0.0, 4.0));
                     let at = [f64::from(x) + u - 320.0, f64::from(y) + v - 240.0];
                     let d = (camera.forward + at[0] * camera.dx + at[1] * camera.dy).normalize();
                     // As f32 has them.
