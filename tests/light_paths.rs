@@ -344,7 +344,7 @@ type Fault = (&'static str, usize, [bool; 2], &'static str, &'static str);
 
 /// A fault in the densities of lobes is not among them: it moves weight between two ways that both find the light, by less than the noise
 /// of these runs.
-const FAULTS: [Fault; 5] = [
+const FAULTS: [Fault; 7] = [
     (
         "light counted twice",
         0,
@@ -372,6 +372,20 @@ const FAULTS: [Fault; 5] = [
         [true, true],
         "return photons * select(in_cone",
         "return 1.1 * photons * select(in_cone",
+    ),
+    (
+        "what is carried past a second surface is dropped",
+        0,
+        [false, true],
+        "let later = path.trail.ratio * turned(x, scattered.wi, scattered.pdf);",
+        "let later = 0.0;",
+    ),
+    (
+        "sixteen passes for fifteen",
+        0,
+        [true, false],
+        "(turns / fmax(ratio + cos, TINY))",
+        "(16.0 / 15.0 * turns / fmax(ratio + cos, TINY))",
     ),
     (
         "a pixel's cosine is forgotten",
