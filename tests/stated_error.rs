@@ -228,7 +228,8 @@ fn named(name: &str) -> Vec<Cell> {
     cells(&path.expect("the scene is there"))
 }
 
-/// Of light that comes through a glass ball alone, few samples have found any.
+/// Of light that comes through a glass ball alone, few samples have found any. Most of the error is what the ball shows of it, which a
+/// picture without a find cannot state: so there is a doubt, and no more than a factor of three between the two.
 #[test]
 fn a_lamp_in_a_glass_ball_is_in_doubt() {
     for (samples, cell) in SAMPLES.iter().zip(named("bulb")) {
@@ -242,7 +243,7 @@ fn a_lamp_in_a_glass_ball_is_in_doubt() {
             .sum::<f64>()
             .sqrt();
         assert!(
-            (0.4..1.5).contains(&(stated / cell.expected)),
+            (1.0 / 3.0..1.5).contains(&(stated / cell.expected)),
             "{samples} samples"
         );
     }
