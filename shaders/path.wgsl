@@ -23,8 +23,9 @@ struct Path {
     only_lights: bool,
     // Glances still to be sent before the path itself, this one included: see glance/.
     glances: u32,
-    // What light that is met by chance is weighed against beside light samples: see light_path/.
+    // What light that is met by chance is weighed against beside light samples: see light_path/ and bulb/.
     trail: LightTrail,
+    bulbs: BulbTrail,
 }
 
 @compute @workgroup_size(64)

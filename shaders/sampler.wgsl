@@ -129,3 +129,10 @@ fn hash_pixel(pixel: u32, s: u32, seed: u32) -> vec2u {
     let w = (v ^ 0x68bc21ebu) * 0x846ca68bu;
     return vec2u(v, w ^ (w >> 16u));
 }
+
+// Power heuristic [Veach1995]: the weight of a sample of density 1 / inverse, which the other way of sampling takes with density b.
+fn power_heuristic(inverse: f32, b: f32) -> f32 {
+    // The ratio first: squares of large densities overflow.
+    let r = b * inverse;
+    return 1.0 / (1.0 + r * r);
+}

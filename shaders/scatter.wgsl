@@ -25,11 +25,13 @@ fn scatter(path: ptr<function, Path>, meets: bool, hit: Hit, pixel: Pixel, sight
     // Not even zero is added where nothing is asked: beta may have left f32.
     let gathered = path.beta * (direct.radiance * light_scale(x.medium));
     gather(path, gathered, goes_on & !specular);
+    gather_bulbs_if(goes_on & !specular, path, &x, u, film);
     path.only_lights = path.only_lights | (WHITTED & !specular);
 
     // A new direction.
     let scattered = sample_bsdf(&x, u);
     follow_trail(path, &x, hit.t, scattered);
+    follow_bulbs(path, &x, scattered);
     path.ray = Ray(x.p, scattered.wi, x.face, scattered.medium, NO_FACE);
     path.specular = scattered.specular;
     path.pdf = scattered.pdf;

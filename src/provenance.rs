@@ -12,7 +12,7 @@ use hash::hash_of;
 use serde::{Deserialize, Serialize, Serializer};
 
 /// Incremented whenever a change to the program changes the value of any sample.
-pub const SAMPLER_VERSION: u32 = 12;
+pub const SAMPLER_VERSION: u32 = 13;
 
 /// The scene, program and devices that a film was rendered with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -228,12 +228,34 @@ fn named(name: &str) -> Vec<Cell> {
     cells(&path.expect("the scene is there"))
 }
 
-/// Of light that comes through a glass ball alone, few samples have found any. Most of the error is what the ball shows of it, which a
-/// picture without a find cannot state: so there is a doubt, and no more than a factor of three between the two.
+/// Light through a glass ball alone is sampled, so there is no doubt about it. Glass reflects a little of it, which is found more rarely.
 #[test]
-fn a_lamp_in_a_glass_ball_is_in_doubt() {
+fn a_lamp_in_a_glass_ball_lights_well() {
     for (samples, cell) in SAMPLES.iter().zip(named("bulb")) {
         print_row("bulb", *samples, &cell);
+        // 103 % at 256 samples if such light is not sampled.
+        let most = 0.1 * (256.0 / *samples as f64).sqrt();
+        assert!(cell.expected < most, "{samples} samples");
+        let ratios = cell.stated.iter().map(|s| s.0 / cell.expected);
+        assert!(
+            ratios.clone().all(|r| (0.7..3.0).contains(&r)),
+            "{samples} samples: {:?}",
+            ratios.collect::<Vec<_>>()
+        );
+        let doubted = cell.stated.iter().filter(|s| s.2).count();
+        assert!(
+            *samples < 256 || doubted <= 1,
+            "{samples} samples: {doubted}"
+        );
+    }
+}
+
+/// Of light that comes through a glass ball by other ways, few samples have found any. Most of the error is what the ball shows of it, which
+/// a picture without a find cannot state: so there is a doubt, and no more than a factor of three between the two.
+#[test]
+fn a_lamp_near_the_edge_of_a_glass_ball_is_in_doubt() {
+    for (samples, cell) in SAMPLES.iter().zip(named("bulb_edge")) {
+        print_row("bulb_edge", *samples, &cell);
         assert!(cell.stated.iter().all(|s| s.2), "{samples} samples");
         let all = f64::from(SEEDS);
         let stated = cell

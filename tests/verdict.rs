@@ -131,7 +131,7 @@ fn false_alarms_are_as_rare_as_stated() {
 /// A find of a bright sample is no change: its pixel's error is not that of its neighbours, which found none.
 #[test]
 fn rare_light_gives_no_false_alarms() {
-    let names = ["bulb", "bulb_hollow", "bulb_small", "sparse_spot"];
+    let names = ["bulb_edge", "bulb_tube", "bulb_small", "sparse_spot"];
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/stated_error");
     let named = |name: &str| {
         (

@@ -16,3 +16,9 @@ fn direct_light_if(asks: bool, x: ptr<function, Interaction>, to: Receiver, key:
     }
     return direct;
 }
+
+fn gather_bulbs_if(asks: bool, path: ptr<function, Path>, x: ptr<function, Interaction>, u: Draws, film: ptr<function, PixelFilm>) {
+    if asks {
+        gather_bulbs(true, path, x, u, film);
+    }
+}

@@ -8,3 +8,7 @@ fn scatter_if(meets: bool, path: ptr<function, Path>, hit: Hit, pixel: Pixel, si
 fn direct_light_if(asks: bool, x: ptr<function, Interaction>, to: Receiver, key: vec4u, u: Draws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     return direct_light(asks, x, to, key, u, depth, film);
 }
+
+fn gather_bulbs_if(asks: bool, path: ptr<function, Path>, x: ptr<function, Interaction>, u: Draws, film: ptr<function, PixelFilm>) {
+    gather_bulbs(asks, path, x, u, film);
+}

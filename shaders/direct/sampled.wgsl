@@ -12,13 +12,6 @@ struct DirectLight {
 // high on 1000 spheres, 1.08 times on phong_gallery, and 1.05 times in a room of 8 lamps and 20 things. 1.5 and 3 were no better.
 const DENSER: f32 = select(1.0, 2.0, GLOSSY);
 
-// Power heuristic [Veach1995]: the weight of a sample of density 1 / inverse, which the other way of sampling takes with density b.
-fn power_heuristic(inverse: f32, b: f32) -> f32 {
-    // The ratio first: squares of large densities overflow.
-    let r = b * inverse;
-    return 1.0 / (1.0 + r * r);
-}
-
 // One of SHADOW_RAYS light samples. If `asks` is false, the radiance is 0 and no ray is traced.
 fn light_sample(asks: bool, x: ptr<function, Interaction>, to: Receiver, u: LightDraws, depth: u32, film: ptr<function, PixelFilm>) -> DirectLight {
     let chosen = choose_light(x.p, to, u.which);

@@ -57,6 +57,11 @@ struct LightPath {
     depth: u32,
     // The surface that the first ray must meet.
     target_surface: u32,
+    // How many surfaces have reflected it, the last of these, and the last that it crossed: see bulb/. And the bulb that its light is in.
+    reflections: u32,
+    by: u32,
+    crossed: u32,
+    bulb: BulbShells,
 }
 
 @compute @workgroup_size(64)
@@ -114,6 +119,8 @@ fn start_path(path: ptr<function, LightPath>, ended: bool, work: ptr<function, W
         path.density = start_density(cone, cos, aim_density(index, aim.index));
         path.turned = 1.0;
         path.depth = 1u;
+        path.reflections = 0u;
+        path.bulb = bulb_shells(index);
         // A direction below the horizon meets nothing.
         path.target_surface = select(NONE, aims[AIM_PLACES + 5u * aim.index + 4u], cos > 0.0);
     }
@@ -137,9 +144,15 @@ fn advance(path: ptr<function, LightPath>, meets: bool, hit: Hit, work: ptr<func
     var x = interaction(path.ray, hit, BY_CHANCE);
     let specular = is_specular(x.material);
     let u = draw(vec4u(work.number, work.pass_number, path.depth, params.seed ^ LIGHT_STREAM));
-    splat_if(meets & !specular & (x.medium == CAMERA_MEDIUM), path, &x, work);
+    // Light of bulbs is sampled from here, by paths from the eye.
+    let sampled = !specular & is_from_bulb(path);
+    splat_if(meets & !specular & !sampled & (x.medium == CAMERA_MEDIUM), path, &x, work);
 
     let scattered = sample_bsdf(&x, u);
+    let reflected = scattered.medium == x.medium;
+    path.reflections += select(0u, 1u, reflected);
+    path.by = select(path.by, x.number, reflected);
+    path.crossed = select(x.number, NONE, reflected);
     path.ray = Ray(x.p, scattered.wi, x.face, scattered.medium, NO_FACE);
     path.turned = fmin(path.turned / fmax(turned(&x, scattered.wi, scattered.pdf), TINY), 1.0e30);
     // The vertex on the light counts too.
@@ -153,7 +166,7 @@ fn advance(path: ptr<function, LightPath>, meets: bool, hit: Hit, work: ptr<func
     let brightest = fmax(fmax(beta.x, beta.y), beta.z);
     let survival = fmin(1.0, brightest / fmax(path.start, TINY));
     path.beta = beta * (1.0 / fmax(survival, TINY));
-    return meets && !last && brightest > 0.0 && u.roulette < survival;
+    return meets && !sampled && !last && brightest > 0.0 && u.roulette < survival;
 }
 
 // Adds the light that the surface scatters to the eye, if the eye sees it.

@@ -1,6 +1,7 @@
 //! What the kernel of a scene needs, decided once from world and settings.
 
 use super::access::{Access, BAKED_LIMIT};
+use super::bulbs;
 use super::glances;
 use super::layout::ShapeKind;
 use super::light_paths::LightPaths;
@@ -10,7 +11,8 @@ use crate::film::{BLOCK, REPLICATES};
 use crate::scene::MaterialKind;
 use crate::settings::{Integrator, LightParts, Settings};
 use crate::world::{
-    AIR, Geometry, World, WorldCamera, WorldPrimitive, light_tree, near_light, visibility,
+    AIR, Geometry, World, WorldCamera, WorldPrimitive, bulbs::Bulb, light_tree, near_light,
+    visibility,
 };
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -108,6 +110,10 @@ pub(super) struct Features {
     extreme_lights: bool,
     /// Lights are sampled.
     pub light_sampling: bool,
+    /// Some of them by straight shadow rays.
+    pub direct: bool,
+    /// Those that are sampled through glass.
+    pub bulbs: Vec<Bulb>,
     /// How one of them is chosen.
     pub choice: LightChoice,
     /// Some of them overlap in one plane.
@@ -167,6 +173,11 @@ impl Features {
         let last_depth = last_depth(settings);
         let scatters = materials.iter().any(|m| !m.is_specular());
         let light_sampling = last_depth > 1 && !world.lights.is_empty() && scatters;
+        let bulbs = if light_sampling {
+            bulbs::sampled(world, settings)
+        } else {
+            Vec::new()
+        };
         let choice = match (world.lights.len(), access) {
             (0 | 1, _) => LightChoice::Only,
             (_, Access::Baked) => LightChoice::Unrolled,
@@ -187,6 +198,8 @@ impl Features {
                 .iter()
                 .any(|l| !ORDINARY_RADII.contains(&l.radius)),
             light_sampling,
+            direct: light_sampling && bulbs.len() < world.lights.len(),
+            bulbs,
             choice,
             hidden_lights: light_sampling && visibility::lights_overlap(world),
             shadow_rays: settings.shadow_rays,
@@ -216,6 +229,8 @@ impl Features {
             lit_caps: false,
             extreme_lights: false,
             light_sampling: probe.glossy,
+            direct: probe.glossy,
+            bulbs: Vec::new(),
             choice: LightChoice::Unrolled,
             hidden_lights: false,
             shadow_rays: 1,
@@ -235,6 +250,7 @@ impl Features {
     pub fn of_light_paths(&self) -> Self {
         Self {
             light_sampling: false,
+            direct: false,
             hidden_lights: false,
             evaluates: true,
             queued: false,
@@ -248,6 +264,7 @@ impl Features {
         parted.groups.len() == 1
             && parted.apart.len() <= BAKED_LIMIT
             && self.light_sampling
+            && self.bulbs.is_empty()
             && self.shadow_rays == 1
             && !self.has_implicit()
             && visibility::rays_escape(world)

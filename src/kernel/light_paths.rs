@@ -1,6 +1,7 @@
 //! Light paths: whether a scene has any, how many, and where they are aimed. `shaders/light_path/` says what they are.
 
 use super::access::Access;
+use super::bulbs;
 use super::emit::fetch::{Scalars, chain};
 use super::features::{constant, last_depth};
 use super::literal::float;
@@ -37,7 +38,7 @@ pub(super) fn aims(world: &World, settings: &Settings) -> Option<Aims> {
     let mut used = (world.primitives.iter()).map(|p| world.materials[p.material].kind());
     let scatters = used.any(|kind| !kind.is_specular());
     if wanted && scatters && last_depth(settings) > 2 {
-        Aims::new(world)
+        Aims::new(world, &bulbs::sampled(world, settings))
     } else {
         None
     }

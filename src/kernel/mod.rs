@@ -2,6 +2,7 @@
 //! primitives, choose its lights and dispatch over its materials.
 
 mod access;
+mod bulbs;
 mod emit;
 mod features;
 mod glances;
@@ -88,6 +89,9 @@ pub(crate) fn compose_with(
     let mut wgsl = String::from("// Made for one scene by etendue.\n");
     append(&mut wgsl, &features, &modules::of_path(&features));
     wgsl.push_str(&scene_text(world, settings, &features, parted));
+    if !features.bulbs.is_empty() {
+        wgsl.push_str(&bulbs::text(world, &features.bulbs));
+    }
     if let Some(LightKernel { aims, photons, .. }) = light.as_ref().filter(|l| !l.aims_bound) {
         wgsl.push_str(&light_paths::aims_in_text(world, aims, *photons));
     }
@@ -114,6 +118,7 @@ fn light_kernel(
     append(&mut wgsl, &own, &modules::of_light_paths(&own));
     wgsl.push_str(&scene_text(world, settings, &own, parted));
     wgsl.push_str(&emit::lights::medium(world));
+    wgsl.push_str(&bulbs::shells(world, &own.bulbs));
     LightKernel {
         wgsl,
         photons: light_paths::photons(&aims, settings.size),
@@ -156,7 +161,7 @@ fn scene_text(
     s.push_str(&emit::surfaces::generate(world, features, parted));
     s.push_str(&emit::lights::scale(world));
     s.push_str(&emit::lights::keeps(settings.light));
-    if features.light_sampling {
+    if features.direct {
         s.push_str(&emit::lights::choose(world, features));
     }
     if features.access == Access::Baked {

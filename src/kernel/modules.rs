@@ -98,6 +98,10 @@ modules! {
     VERTEX = "vertex",
     STORE_FINISHED = "store/finished",
     STORE_UNFINISHED = "store/unfinished",
+    BULB_NONE = "bulb/none",
+    BULB_WAYS = "bulb/ways",
+    BULB_RAY = "bulb/ray",
+    BULB_SAMPLED = "bulb/sampled",
     LIGHT_PATH_NONE = "light_path/none",
     LIGHT_PATH_WEIGHED = "light_path/weighed",
     LIGHT_PATH_AIMS = "light_path/aims",
@@ -105,6 +109,8 @@ modules! {
     LIGHT_PATH_MATT = "light_path/matt",
     LIGHT_PATH_GLOSSY = "light_path/glossy",
     LIGHT_PATH_TRACE = "light_path/trace",
+    LIGHT_PATH_IN_BULB = "light_path/in_bulb",
+    LIGHT_PATH_IN_NO_BULB = "light_path/in_no_bulb",
     LIGHT_PATH_STRAIGHT = "light_path/straight",
     LIGHT_PATH_BRANCHING = "light_path/branching",
 }
@@ -147,8 +153,13 @@ pub(super) fn of_path(f: &Features) -> Vec<Module> {
             }
         }
     }
-    modules.extend((f.light_sampling && !f.queued).then_some(RAYS_LIT));
-    modules.extend(match (f.light_sampling, f.shadow_rays) {
+    modules.extend(if f.bulbs.is_empty() {
+        vec![BULB_NONE]
+    } else {
+        vec![BULB_WAYS, BULB_RAY, BULB_SAMPLED]
+    });
+    modules.extend((f.direct && !f.queued).then_some(RAYS_LIT));
+    modules.extend(match (f.direct, f.shadow_rays) {
         (false, _) => vec![DIRECT_NONE],
         (true, 1) => vec![DIRECT_SAMPLED, DIRECT_ONE],
         (true, _) => vec![DIRECT_SAMPLED, DIRECT_SEVERAL],
@@ -171,6 +182,11 @@ pub(super) fn of_light_paths(f: &Features) -> Vec<Module> {
         VERTEX,
     ];
     modules.extend(f.has_smooth_normals.then_some(ADJOINT));
+    modules.extend(if f.bulbs.is_empty() {
+        vec![LIGHT_PATH_IN_NO_BULB]
+    } else {
+        vec![BULB_WAYS, LIGHT_PATH_IN_BULB]
+    });
     modules.extend(match f.access {
         _ if f.counts_trips() => [TRIPS_COUNTED, LIGHT_PATH_BRANCHING],
         Access::Baked => [TRIPS_UNLIMITED, LIGHT_PATH_STRAIGHT],
@@ -232,7 +248,7 @@ pub(super) fn of_scene(f: &Features) -> Vec<Module> {
     } else {
         RECEIVER_MATT
     });
-    if f.light_sampling {
+    if f.direct {
         modules.push(CHOSEN);
         modules.extend(match f.choice {
             LightChoice::Only => vec![PROBABILITY_ONE],

@@ -3,6 +3,7 @@
 //! A light path starts at a point of a light, in a direction to a specular surface, which must be the first thing that it meets. So
 //! every light path belongs to one pair, and a path from the eye that ends on a light by way of that surface knows its density.
 
+use super::bulbs::Bulb;
 use super::geometry::DiskSide;
 use super::visibility::lights_overlap;
 use super::{Geometry, Side, World, WorldLight, WorldPrimitive};
@@ -47,8 +48,8 @@ pub(crate) struct Aims {
 }
 
 impl Aims {
-    /// The pairs of `world`; `None` if no light can meet a specular surface.
-    pub fn new(world: &World) -> Option<Self> {
+    /// The pairs of `world`; `None` if no light can meet a specular surface. Paths from the eye sample most of the light of `bulbs`.
+    pub fn new(world: &World, bulbs: &[Bulb]) -> Option<Self> {
         let overlap = lights_overlap(world);
         let usable: Vec<bool> = (0..world.lights.len())
             .map(|l| usable(world, l, overlap))
@@ -67,6 +68,9 @@ impl Aims {
                 .filter(|l| *l.1)
                 .map(|l| l.0)
         };
+        let left: Vec<f64> = (0..world.lights.len())
+            .map(|l| left_to_light_paths(bulbs, l))
+            .collect();
         let from_all = |t: &Target| -> f64 { lights().map(|l| flux(world, l, t)).sum() };
         let most = MOST_PAIRS / world.lights.len().max(1);
         if targets.len() > most {
@@ -77,9 +81,15 @@ impl Aims {
             targets = ranked.into_iter().map(|r| r.1).collect();
             targets.sort_by_key(|t| t.number);
         }
-        let weights: Vec<f64> = (world.lights.iter().zip(&usable))
-            .flat_map(|(l, usable)| targets.iter().map(move |t| (l, *usable, t)))
-            .map(|(l, usable, t)| if usable { flux(world, l, t) } else { 0.0 })
+        let weights: Vec<f64> = (world.lights.iter().zip(&usable).zip(&left))
+            .flat_map(|((l, usable), left)| targets.iter().map(move |t| (l, *usable, left, t)))
+            .map(|(l, usable, left, t)| {
+                if usable {
+                    left * flux(world, l, t)
+                } else {
+                    0.0
+                }
+            })
             .collect();
         let all: f64 = weights.iter().sum();
         if !(all > 0.0 && all.is_finite()) {
@@ -108,6 +118,16 @@ impl Aims {
         let pair = light * self.targets.len() + target;
         let before = pair.checked_sub(1).map_or(0, |k| self.cumulative[k]);
         f64::from(self.cumulative[pair] - before) / PARTS
+    }
+}
+
+/// The share of a light's light that light paths look for. What else there is of a bulb has been reflected by its glass, once or twice at
+/// least, and glass reflects about a twentieth.
+fn left_to_light_paths(bulbs: &[Bulb], light: usize) -> f64 {
+    match bulbs.iter().find(|b| b.light == light) {
+        None => 1.0,
+        Some(b) if b.reflects => 0.01,
+        Some(_) => 0.1,
     }
 }
 
@@ -207,7 +227,7 @@ mod tests {
              [[plane]]\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n{things}"
         );
         let scene = parse_str("room.toml".as_ref(), &text).expect("a scene");
-        Aims::new(&World::new(&scene, [8, 8]))
+        Aims::new(&World::new(&scene, [8, 8]), &[])
     }
 
     fn light(center: &str) -> String {

@@ -16,6 +16,7 @@
 
 pub(crate) mod aims;
 mod bounds;
+pub(crate) mod bulbs;
 mod faces;
 mod geometry;
 pub(crate) mod light_tree;

@@ -5,9 +5,12 @@
 
 use super::{FilmBox, Mark};
 use crate::film::coverage::Rect;
+use crate::world::bulbs::bulbs;
 use crate::world::trace::{Hit, Met, Ray, camera_ray};
 use crate::world::{Geometry, World};
+use glam::DVec3;
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 /// A ray refracts wherever it can. Other rays are reflected once instead, at one of this many first vertices.
@@ -18,6 +21,12 @@ const FINE_WIDTH: u32 = 384;
 
 /// The largest number of points along the side of a pixel.
 const MAX_FINE: u32 = 4;
+
+/// Points of a light's rim whose images are looked for.
+const RIM_POINTS: u32 = 16;
+
+/// The share of an image's size that is added around these points.
+const RIM_SLACK: f64 = 0.1;
 
 /// The light that a ray reaches by way of mirrors and glass.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -44,6 +53,16 @@ pub(super) struct Chains {
     pixels: Vec<FilmBox>,
     /// Points along the side of a pixel.
     fine: u32,
+    /// Images that may be too small for these points.
+    images: Vec<Image>,
+}
+
+/// The image of a light in the glass ball around it, which reflects it once: a part of the film, and its mark.
+#[derive(Debug, Clone, Copy)]
+struct Image {
+    pixels: FilmBox,
+    last_vertex: u8,
+    branch_vertex: u8,
 }
 
 impl Chains {
@@ -78,6 +97,7 @@ impl Chains {
             size,
             last_vertex,
             fine: FINE_WIDTH.div_ceil(size[0]).clamp(1, MAX_FINE),
+            images: images(world, size, last_vertex),
         }
     }
 
@@ -208,7 +228,70 @@ impl Chains {
                 *mark = mark_of((0..fine + 3).flat_map(own));
             }
         });
+        for image in &self.images {
+            image.mark(rect, marks);
+        }
     }
+}
+
+impl Image {
+    fn mark(&self, rect: Rect, marks: &mut [Mark]) {
+        let touched = |low: f64, high: f64, first: u32, end: u32| {
+            let inside = |k: f64| k.clamp(f64::from(first), f64::from(end)) as u32;
+            inside(low.floor())..inside(high.floor() + 1.0)
+        };
+        let FilmBox {
+            min_x,
+            max_x,
+            min_y,
+            max_y,
+        } = self.pixels;
+        for y in touched(min_y, max_y, rect.y0, rect.y1) {
+            for x in touched(min_x, max_x, rect.x0, rect.x1) {
+                let mark = &mut marks[((y - rect.y0) * rect.width() + x - rect.x0) as usize];
+                mark.last_vertex = mark.last_vertex.max(self.last_vertex);
+                if mark.branch_vertex == 0 {
+                    mark.branch_vertex = self.branch_vertex;
+                }
+            }
+        }
+    }
+}
+
+/// The images of lights that glass balls around them reflect once.
+fn images(world: &World, size: [u32; 2], last_vertex: u32) -> Vec<Image> {
+    let camera = &world.camera;
+    let mut images = Vec::new();
+    for bulb in bulbs(world) {
+        if camera.medium != bulb.medium {
+            continue;
+        }
+        let light = &world.lights[bulb.light];
+        let x = light.normal.any_orthonormal_vector();
+        let y = light.normal.cross(x);
+        let rim = (0..RIM_POINTS).map(|k| {
+            let angle = TAU * f64::from(k) / f64::from(RIM_POINTS);
+            light.center + (x * angle.cos() + y * angle.sin()) * light.radius
+        });
+        let points: Vec<DVec3> = rim.chain([light.center]).collect();
+        for way in bulb.reflected_ways() {
+            let [branch, last] = bulb.vertices(*way);
+            let seen = points.iter().filter_map(|p| {
+                let ray = bulb.ray(*way, *p, camera.eye)?;
+                let faces = ray.leaves.dot(light.normal) > 0.0;
+                faces
+                    .then(|| FilmBox::of_direction(camera, size, ray.d))
+                    .flatten()
+            });
+            let whole = seen.reduce(FilmBox::union).filter(|_| last <= last_vertex);
+            images.extend(whole.map(|pixels| Image {
+                pixels: pixels.widened(RIM_SLACK),
+                last_vertex: last as u8,
+                branch_vertex: branch as u8,
+            }));
+        }
+    }
+    images
 }
 
 /// What a ray that ends at `hit` has reached.

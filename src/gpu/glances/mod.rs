@@ -136,6 +136,44 @@ impl FilmBox {
         }
     }
 
+    /// The place where a ray from the eye in direction `d` meets the film; `None` for one that leads backwards.
+    fn of_direction(camera: &WorldCamera, [width, height]: [u32; 2], d: DVec3) -> Option<Self> {
+        let pixel2 = camera.dx.length_squared();
+        let depth = camera.forward.dot(d);
+        let x = camera.dx.dot(d) / (pixel2 * depth) + f64::from(width) / 2.0;
+        let y = camera.dy.dot(d) / (pixel2 * depth) + f64::from(height) / 2.0;
+        (depth > 0.0).then_some(Self {
+            min_x: x,
+            max_x: x,
+            min_y: y,
+            max_y: y,
+        })
+    }
+
+    /// The smallest box around both.
+    fn union(self, other: Self) -> Self {
+        Self {
+            min_x: self.min_x.min(other.min_x),
+            max_x: self.max_x.max(other.max_x),
+            min_y: self.min_y.min(other.min_y),
+            max_y: self.max_y.max(other.max_y),
+        }
+    }
+
+    /// The box with this share of its size added on each side.
+    fn widened(self, share: f64) -> Self {
+        let (x, y) = (
+            share * (self.max_x - self.min_x),
+            share * (self.max_y - self.min_y),
+        );
+        Self {
+            min_x: self.min_x - x,
+            max_x: self.max_x + x,
+            min_y: self.min_y - y,
+            max_y: self.max_y + y,
+        }
+    }
+
     /// The pixels that a ball may touch; `None` for a ball behind the eye.
     fn of_ball(camera: &WorldCamera, size: [u32; 2], center: DVec3, radius: f64) -> Option<Self> {
         let to = center - camera.eye;

@@ -27,10 +27,15 @@ pub(in crate::kernel) fn choose(world: &World, features: &Features) -> String {
             let mut s = String::from(HEAD);
             let mut before = String::new();
             for (i, l) in world.lights.iter().enumerate() {
-                let light = DiskLight::of(l).constructor();
+                let weight = if features.bulbs.iter().any(|b| b.light == i) {
+                    // No straight shadow ray arrives there.
+                    float(0.0)
+                } else {
+                    format!("light_weight({}, p, to)", DiskLight::of(l).constructor())
+                };
                 let _ = write!(
                     s,
-                    "    let w_{i} = light_weight({light}, p, to);
+                    "    let w_{i} = {weight};
     let sum_{i} = {before}w_{i};
 "
                 );

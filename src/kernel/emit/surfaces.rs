@@ -87,7 +87,7 @@ impl Function {
     }
 }
 
-/// `intersect`, and `occluded` if lights are sampled. `parted` says which surfaces lie in trees, if there are trees.
+/// `intersect`, and `occluded` if lights are sampled by straight shadow rays. `parted` says which surfaces lie in trees, if there are trees.
 pub(in crate::kernel) fn generate(
     world: &World,
     features: &Features,
@@ -104,7 +104,7 @@ pub(in crate::kernel) fn generate(
     let queued = features.queued;
     let apart = if queued { "_apart" } else { "" };
     if let Some(parted) = parted.filter(|_| !queued) {
-        s.push_str(&trees::walks(world, parted, features.light_sampling));
+        s.push_str(&trees::walks(world, parted, features.direct));
     }
     let _ = write!(
         s,
@@ -118,7 +118,7 @@ fn intersect{apart}(ray: Ray) -> Hit {{
         trees::calls(&mut s, parted, "nearest");
     }
     s.push_str("    return hit;\n}\n\n");
-    if !features.light_sampling {
+    if !features.direct {
         return s;
     }
     let _ = write!(

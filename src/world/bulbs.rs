@@ -1,0 +1,491 @@
+//! Bulbs: lights inside glass balls whose light can be sampled from outside.
+//!
+//! A shadow ray to a light inside glass must be refracted on its way. Through a sphere it stays in the plane of its two ends and the centre,
+//! and n r sin(angle to the radius), its *impact*, is the same at every radius r and index n (Bouguer's law). So the angle that a ray sweeps
+//! around the centre is a sum of arcsines of its impact, and `shaders/bulb/sampled.wgsl` finds the one ray between two points by
+//! Newton's method.
+//!
+//! There is one ray only if the swept angle grows with the angle at which light leaves. Newton's method is quick if it grows evenly. Both are
+//! tried here for each light, and lights of which either fails are left to chance and to light paths.
+
+use super::geometry::DiskSide;
+use super::{AIR, Geometry, Side, World, WorldLight, WorldPrimitive};
+use crate::coincidence::{slack, spheres};
+use crate::scene::Bsdf;
+use glam::DVec3;
+use std::f64::consts::PI;
+
+/// The most bulbs. The kernel has a line for each, and the others are left to chance.
+const MOST: usize = 24;
+
+/// The most pairs of a light in glass and a surface that are looked at. With more, none of the lights is sampled through glass.
+const MOST_PAIRS: usize = 10_000_000;
+
+/// The steps of Newton's method that the kernel takes. `shaders/bulb/sampled.wgsl` has as many.
+const STEPS: usize = 4;
+
+/// What may be left of the angle after these steps, in radians: less than f32 resolves of a scene.
+const LEFT: f64 = 1e-7;
+
+/// The greatest sine of an angle to a shell's radius. Beyond, light grazes the glass, and rounding decides whether it passes.
+const STEEPEST: f64 = 0.9;
+
+/// Outer radii at whose multiples the receivers stand for which a bulb is tried.
+const DISTANCES: [f64; 4] = [1.0, 1.05, 1.5, 1e6];
+
+/// A spherical boundary between two media.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Shell {
+    /// Number of its sphere among lights and primitives.
+    pub number: usize,
+    /// Radius.
+    pub radius: f64,
+    /// Index of refraction inside and outside, relative to air.
+    pub indices: [f64; 2],
+    /// What it transmits of each colour.
+    pub transmittance: DVec3,
+}
+
+/// A light in one or two concentric shells, with nothing else in them that its light could meet.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Bulb {
+    /// Number of the light.
+    pub light: usize,
+    /// Centre of the shells.
+    pub center: DVec3,
+    /// From the light outwards; of one, both are the same.
+    pub shells: [Shell; 2],
+    /// How many shells there are.
+    pub count: u32,
+    /// Light that the shells have reflected once is sampled too.
+    pub reflects: bool,
+    /// The medium outside.
+    pub medium: u32,
+}
+
+/// A way out of a bulb. `shaders/bulb/ways.wgsl` has the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// Through the shells.
+    Straight,
+    /// Reflected by the inner shell first.
+    Inner,
+    /// By the outer one.
+    Outer,
+}
+
+/// A ray from a point of a bulb's light to a point outside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct BulbRay {
+    /// Unit direction from the point outside to the bulb.
+    pub d: DVec3,
+    /// Unit direction in which the ray leaves the light.
+    pub leaves: DVec3,
+}
+
+impl Bulb {
+    /// The bulb of this light, if it is in one.
+    fn of(world: &World, light: usize) -> Option<Self> {
+        let l = &world.lights[light];
+        let mut shells: Vec<Shell> = Vec::new();
+        let mut medium = l.medium?;
+        let mut center = DVec3::ZERO;
+        while medium != AIR {
+            let number = world.primitives.iter().position(|p| p.solid == medium)?;
+            let p = &world.primitives[number];
+            let (Geometry::Sphere { center: c, radius }, Bsdf::Dielectric { transmittance, .. }) =
+                (&p.geometry, world.materials[p.material])
+            else {
+                break;
+            };
+            if shells.is_empty() {
+                center = *c;
+            } else if c.distance(center) > slack(*radius) {
+                break;
+            }
+            shells.push(Shell {
+                number: world.lights.len() + number,
+                radius: *radius,
+                indices: [medium, p.parent].map(|m| world.indices[m as usize]),
+                transmittance,
+            });
+            medium = p.parent;
+        }
+        let (first, last) = (*shells.first()?, *shells.last()?);
+        let mut bulb = Self {
+            light,
+            center,
+            shells: [first, last],
+            count: shells.len() as u32,
+            reflects: false,
+            medium,
+        };
+        let farthest = farthest(l, center);
+        let in_ball = |other: &&WorldLight| bulb.side_of(other) != DiskSide::Outside;
+        let is_only = world.lights.iter().filter(in_ball).count() == 1;
+        let once = [Way::Inner, Way::Outer];
+        bulb.reflects = is_only && once.iter().all(|w| bulb.has_one_ray(*w, farthest));
+        let fits = bulb.count <= 2
+            && has_receivers(world, bulb.medium)
+            && is_alone(world, light, &bulb)
+            && bulb.has_one_ray(Way::Straight, farthest);
+        fits.then_some(bulb)
+    }
+
+    /// Where a light lies relative to the outer shell.
+    fn side_of(&self, l: &WorldLight) -> DiskSide {
+        let ball = Geometry::Sphere {
+            center: self.center,
+            radius: self.shells[1].radius,
+        };
+        ball.side_of_disk(l.center, l.normal, l.radius)
+    }
+
+    /// The angle around the centre that a ray sweeps from a point at distance `d` from it, which it leaves at angle `alpha` to the
+    /// direction from the centre, to distance `x` outside, less pi if it is reflected; and its derivative by `alpha`. `None` if it meets
+    /// a shell too steeply. `shaders/bulb/ray.wgsl` has the same sum.
+    fn sweep(&self, way: Way, d: f64, alpha: f64, x: f64) -> Option<[f64; 2]> {
+        let n = self.shells[0].indices[0];
+        let (impact, slope) = (n * d * alpha.sin(), n * d * alpha.cos());
+        let (mut angle, mut derivative, mut passes) = (alpha, 1.0, true);
+        let mut add = |times: f64, n: f64, r: f64| {
+            let k = 1.0 / (n * r);
+            let s = impact * k;
+            angle += times * s.asin();
+            derivative += times * slope * k / (1.0 - s * s).sqrt();
+            passes &= s.abs() <= STEEPEST;
+        };
+        let [inner, outer] = &self.shells;
+        let [in_cavity, in_glass] = match way {
+            Way::Straight => [1.0, 1.0],
+            Way::Inner => [3.0, 1.0],
+            Way::Outer => [3.0, 3.0],
+        };
+        add(-in_cavity, inner.indices[0], inner.radius);
+        if self.count == 2 {
+            add(in_glass, inner.indices[1], inner.radius);
+            add(-in_glass, outer.indices[0], outer.radius);
+        }
+        add(1.0, outer.indices[1], outer.radius);
+        add(-1.0, outer.indices[1], x);
+        passes.then_some([angle, derivative])
+    }
+
+    /// The angle to the direction from the centre at which a ray of this way leaves a point at distance `d` from the centre to sweep `angle`
+    /// to distance `x`, modulo a turn.
+    fn leaving_angle(&self, way: Way, d: f64, angle: f64, x: f64) -> Option<f64> {
+        // A reflected ray sweeps pi more.
+        let target = if way == Way::Straight {
+            angle
+        } else {
+            angle - PI
+        };
+        let mut alpha = target;
+        for _ in 0..STEPS {
+            let [swept, derivative] = self.sweep(way, d, alpha, x)?;
+            alpha -= (swept - target).sin() / derivative;
+        }
+        let [swept, _] = self.sweep(way, d, alpha, x)?;
+        ((swept - target).abs() <= LEFT).then_some(alpha)
+    }
+
+    /// The ray of this way from `y`, a point of the light, to `x` outside.
+    pub fn ray(&self, way: Way, y: DVec3, x: DVec3) -> Option<BulbRay> {
+        let (from, to) = (y - self.center, x - self.center);
+        let (d, distance) = (from.length(), to.length());
+        let outwards = to / distance;
+        let along = if d > 0.0 { from / d } else { outwards };
+        let across = (outwards - along * along.dot(outwards)).normalize_or_zero();
+        let angle = across.dot(outwards).atan2(along.dot(outwards));
+        let alpha = self.leaving_angle(way, d, angle, distance)?;
+        let impact = self.shells[0].indices[0] * d * alpha.sin();
+        let sin = impact / (self.shells[1].indices[1] * distance);
+        let onwards = across * angle.cos() - along * angle.sin();
+        Some(BulbRay {
+            d: -outwards * (1.0 - sin * sin).sqrt() - onwards * sin,
+            leaves: along * alpha.cos() + across * alpha.sin(),
+        })
+    }
+
+    /// The ways whose light is sampled, but for the straight one.
+    pub fn reflected_ways(&self) -> &'static [Way] {
+        match (self.reflects, self.count) {
+            (false, _) => &[],
+            (true, 1) => &[Way::Outer],
+            (true, _) => &[Way::Inner, Way::Outer],
+        }
+    }
+
+    /// The vertex at which a path from outside is reflected on this way, and that of the light; the first has 1.
+    pub fn vertices(&self, way: Way) -> [u32; 2] {
+        match (way, self.count) {
+            (Way::Straight, n) => [0, n + 1],
+            (Way::Outer, 1) => [2, 3],
+            (Way::Inner, _) => [3, 4],
+            (Way::Outer, _) => [4, 6],
+        }
+    }
+
+    /// Whether there is one such ray from every point at most `farthest` from the centre to every point outside, and the kernel finds it.
+    fn has_one_ray(&self, way: Way, farthest: f64) -> bool {
+        const POINTS: usize = 4;
+        const ANGLES: usize = 32;
+        let grows = |d: f64, angle: f64, x: f64| {
+            let [_, derivative] = self.sweep(way, d, angle, x)?;
+            Some(derivative > 0.0)
+        };
+        let points = (1..=POINTS).map(|i| farthest * i as f64 / POINTS as f64);
+        let mut tried = points.flat_map(|d| (0..=ANGLES).map(move |k| (d, k)));
+        tried.all(|(d, k)| {
+            let angle = PI * k as f64 / ANGLES as f64;
+            DISTANCES.iter().all(|far| {
+                let x = far * self.shells[1].radius;
+                grows(d, angle, x) == Some(true) && self.leaving_angle(way, d, angle, x).is_some()
+            })
+        })
+    }
+}
+
+/// The bulbs of a world.
+pub(crate) fn bulbs(world: &World) -> Vec<Bulb> {
+    let may_be_one =
+        |l: &&WorldLight| l.medium.is_some_and(|m| m != AIR) && l.emitted.max_element() > 0.0;
+    let candidates = world.lights.iter().filter(may_be_one).count();
+    // A light that a surface cuts is in several media, and radiances are without the factors of refraction then.
+    if world.light_scales.is_some() || candidates * world.surface_count() > MOST_PAIRS {
+        return Vec::new();
+    }
+    let lights = (0..world.lights.len()).filter(|&l| may_be_one(&&world.lights[l]));
+    lights
+        .filter_map(|l| Bulb::of(world, l))
+        .take(MOST)
+        .collect()
+}
+
+/// The distance of the light's farthest point from `center`.
+fn farthest(l: &WorldLight, center: DVec3) -> f64 {
+    let v = l.center - center;
+    let along = v.dot(l.normal);
+    along.hypot((v - l.normal * along).length() + l.radius)
+}
+
+/// Whether surfaces that scatter lie in this medium, as far as their middle tells.
+fn has_receivers(world: &World, medium: u32) -> bool {
+    let solid = world.primitives.iter().find(|p| p.solid == medium);
+    let mut scattering =
+        (world.primitives.iter()).filter(|p| !world.materials[p.material].kind().is_specular());
+    match solid.filter(|_| medium != AIR) {
+        None => true,
+        Some(solid) => scattering.any(|p| solid.geometry.holds(p.geometry.core().0)),
+    }
+}
+
+/// Whether nothing in the outer shell can stand in the way of the light but the shells themselves.
+fn is_alone(world: &World, light: usize, bulb: &Bulb) -> bool {
+    let l = &world.lights[light];
+    let outer = bulb.shells[1];
+    let clear = |other: &WorldLight| match bulb.side_of(other) {
+        DiskSide::Outside => true,
+        DiskSide::Cut => false,
+        // It lies behind the light.
+        DiskSide::Inside => {
+            let reach = other.radius * l.normal.cross(other.normal).length();
+            other.face != l.face && l.normal.dot(other.center) + reach <= l.offset
+        }
+    };
+    let others = (0..world.lights.len()).filter(|&k| k != light);
+    let is_shell = |number: usize| bulb.shells.iter().any(|s| s.number == number);
+    let primitives = (world.lights.len()..).zip(&world.primitives);
+    others.map(|k| &world.lights[k]).all(clear)
+        && primitives
+            .filter(|(number, _)| !is_shell(*number))
+            .all(|(_, p)| is_clear_of(p, bulb.center, outer.radius))
+}
+
+/// Whether no part of the surface lies in the ball. A cylinder or an implicit surface is taken for its box.
+fn is_clear_of(p: &WorldPrimitive, center: DVec3, radius: f64) -> bool {
+    let far = radius - slack(radius);
+    match p.geometry {
+        Geometry::Sphere {
+            center: c,
+            radius: r,
+        } => {
+            let between = c.distance(center);
+            let coincide = spheres([center, c], [radius, r], crate::coincidence::MAY_COINCIDE);
+            !coincide && (between >= far + r || r >= far + between)
+        }
+        Geometry::Plane { normal, offset } => (normal.dot(center) - offset).abs() >= far,
+        Geometry::HugeSphere {
+            pole,
+            normal,
+            radius: r,
+        } => {
+            let v = center - pole;
+            // The height over the sphere, to second order in v / r.
+            let height = normal.dot(v) + 0.5 * v.length_squared() / r;
+            height.abs() >= far * (1.0 + 1e-3)
+        }
+        Geometry::Disk {
+            center: c,
+            normal,
+            radius: r,
+            ..
+        } => {
+            let v = center - c;
+            let along = v.dot(normal);
+            let beside = ((v - normal * along).length() - r).max(0.0);
+            along.hypot(beside) >= far
+        }
+        Geometry::Cylinder {
+            base,
+            axis,
+            offsets,
+            radius: r,
+        } if p.side == Side::Inside => {
+            // The ball lies in the solid.
+            let along = axis.dot(center);
+            let v = center - base;
+            let beside = (v - axis * v.dot(axis)).length();
+            along - offsets[0] >= far && offsets[1] - along >= far && r - beside >= far
+        }
+        _ => p.geometry.bounds().is_some_and(|b| {
+            let nearest = center.clamp(b.min, b.max);
+            nearest.distance(center) >= far
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::parse::parse_str;
+    use crate::world::trace::Ray;
+
+    /// A world with these things over a floor, and an eye in air.
+    fn world(things: &str) -> World {
+        let text = format!(
+            "[camera]\neye = [0, 1, 9]\nlook_at = [0, 1, 0]\nvfov = 40\nresolution = [8, 8]\n\
+             [material.white]\ntype = 'diffuse'\nreflectance = [0.5, 0.5, 0.5]\n\
+             [material.glass]\ntype = 'dielectric'\nior = 1.5\n\
+             [material.dense]\ntype = 'dielectric'\nior = 3\n\
+             [material.bubble]\ntype = 'dielectric'\nior = 0.6666666666666666\n\
+             [[plane]]\npoint = [0, -2, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n{things}"
+        );
+        let scene = parse_str("room.toml".as_ref(), &text).expect("a scene");
+        World::new(&scene, [8, 8])
+    }
+
+    fn light(center: [f64; 3], radius: f64) -> String {
+        format!(
+            "[[light]]\ncenter = {center:?}\nnormal = [0.2, -1, 0.1]\nradius = {radius}\nradiance = [1, 1, 1]\n"
+        )
+    }
+
+    fn ball(center: [f64; 3], radius: f64, material: &str) -> String {
+        format!("[[sphere]]\ncenter = {center:?}\nradius = {radius}\nmaterial = '{material}'\n")
+    }
+
+    /// How many shells the only light's bulb has, and whether reflected light is sampled; `None` if it is in no bulb.
+    fn bulb(things: &str) -> Option<(u32, bool)> {
+        let found = bulbs(&world(things));
+        assert!(found.len() < 2);
+        found.first().map(|b| (b.count, b.reflects))
+    }
+
+    #[test]
+    fn lights_alone_in_the_middle_of_balls_are_bulbs() {
+        let [o, side] = [[0.0; 3], [0.5, 0.0, 0.0]];
+        let glass = ball(o, 1.0, "glass");
+        let lamp = light(o, 0.1);
+        let hollow = glass.clone() + &ball(o, 0.9, "bubble");
+        assert_eq!(bulb(&lamp), None, "in air");
+        assert_eq!(bulb(&(lamp.clone() + &glass)), Some((1, true)));
+        assert_eq!(bulb(&(lamp.clone() + &hollow)), Some((2, true)));
+        assert_eq!(bulb(&(light(o, 0.4) + &glass)), Some((1, false)), "large");
+        assert_eq!(bulb(&(light(side, 0.2) + &glass)), None, "total reflection");
+        assert_eq!(bulb(&(light(side, 0.1) + &ball(o, 1.0, "dense"))), None);
+        assert_eq!(bulb(&(light(o, 0.9) + &ball(o, 0.5, "glass"))), None, "cut");
+        let aside = glass.clone() + &ball([0.01, 0.0, 0.0], 0.9, "bubble");
+        assert_eq!(bulb(&(lamp.clone() + &aside)), None, "shells aside");
+        let three = hollow.clone() + &ball(o, 0.8, "glass");
+        assert_eq!(bulb(&(lamp.clone() + &three)), None, "three shells");
+        // What else is in the ball, cuts it, touches it, or is around it.
+        let with = |more: String| bulb(&(lamp.clone() + &glass + &more));
+        assert_eq!(with(ball([0.0, 0.5, 0.0], 0.1, "white")), None);
+        assert_eq!(with(ball([0.0, 1.0, 0.0], 0.1, "white")), None);
+        assert_eq!(with(ball([0.0, 1.5, 0.0], 0.5, "white")), Some((1, true)));
+        assert_eq!(with(ball(o, 20.0, "white")), Some((1, true)));
+        assert_eq!(
+            with(
+                "[[plane]]\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n"
+                    .to_owned()
+            ),
+            Some((1, true))
+        );
+        assert_eq!(
+            with(
+                "[[plane]]\npoint = [0, -0.9, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n"
+                    .to_owned()
+            ),
+            None
+        );
+        // Another light behind it blocks no straight ray, but reflected ones; one before it blocks both.
+        let behind = lamp
+            .replace("[0.0, 0.0, 0.0]", "[0.0, 0.2, 0.0]")
+            .replace("[0.2, -1, 0.1]", "[-0.2, 1, -0.1]");
+        let two = bulbs(&world(&(lamp.clone() + &glass + &behind)));
+        assert_eq!(
+            two.iter().map(|b| b.reflects).collect::<Vec<_>>(),
+            [false, false]
+        );
+        let before = behind.replace("[-0.2, 1, -0.1]", "[0.2, -1, 0.1]");
+        let one = bulbs(&world(&(lamp.clone() + &glass + &before)));
+        assert_eq!(one.len(), 1);
+    }
+
+    /// Rays that are found are traced from outside, and must come to the point of the light, by the ways that they are said to take.
+    #[test]
+    fn rays_come_from_the_light() {
+        let o = [0.0; 3];
+        let lamp = light([0.05, 0.02, 0.0], 0.12);
+        let solid = ball(o, 1.0, "glass");
+        let dense = ball(o, 1.0, "dense");
+        let hollow = solid.clone() + &ball(o, 0.8, "bubble");
+        for shells in [solid, dense, hollow] {
+            let world = world(&(lamp.clone() + &shells));
+            let bulb = bulbs(&world).remove(0);
+            let l = &world.lights[0];
+            let mut glass = world.clone();
+            glass.lights.clear();
+            glass.primitives.retain(|p| p.solid != AIR);
+            let ways = [&[Way::Straight], bulb.reflected_ways()].concat();
+            assert!(ways.len() as u32 == 1 + bulb.count);
+            let mut u = crate::gpu::probe::Uniform(5);
+            for way in ways {
+                for _ in 0..200 {
+                    let aside = u.vector().cross(l.normal);
+                    let y = l.center + aside * (0.7 * l.radius / 2.0);
+                    let x = bulb.center + u.vector().normalize() * u.between(1.0001, 5.0);
+                    let found = bulb.ray(way, y, x).expect("a ray");
+                    let mut ray = Ray {
+                        origin: x,
+                        direction: found.d,
+                        medium: AIR,
+                        face: 0,
+                    };
+                    let [reflection, last] = bulb.vertices(way);
+                    for vertex in 1..last {
+                        let hit = glass.intersect(&ray).expect("a shell");
+                        ray = glass
+                            .specular(&hit, &ray, vertex == reflection)
+                            .expect("glass");
+                    }
+                    assert_eq!(ray.medium, l.medium.expect("a medium"));
+                    let off = (y - ray.origin).cross(ray.direction).length();
+                    assert!(off < 1e-6, "{way:?}: {off}");
+                    assert!((ray.direction + found.leaves).length() < 1e-6, "{way:?}");
+                }
+            }
+        }
+    }
+}
