@@ -418,6 +418,20 @@ fn the_reference_agrees() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
+#[test]
+fn bulbs_are_as_bright_in_every_access() {
+    let number = FIRST_BULB + 1;
+    let (name, room) = case(number);
+    for access in [Access::Buffers, Access::Tree] {
+        let with = kernel(&room, true, SAMPLES[0], |k| {
+            let world = World::new(&room, SIZE);
+            *k = compose(&world, &indirect(&room, 0, true), Some(access));
+        });
+        let p = p(name, &with, &by_reference(number));
+        assert!(p > FALSE_ALARM, "{access:?}");
+    }
+}
+
 /// Puts other text in the place of one that is there once.
 fn replace(text: &mut String, old: &str, new: &str) {
     assert_eq!(text.matches(old).count(), 1, "{old}");

@@ -186,13 +186,45 @@ fn implicit_surfaces_of_every_material_are_valid() {
     }
 }
 
+/// A lamp in a hollow glass ball, one in a solid ball, and one in the open, over a floor of this material.
+fn with_bulbs(material: usize) -> String {
+    let (name, keys) = MATERIALS[material];
+    let lamp = |x: f64| {
+        format!(
+            "[[light]]\ncenter = [{x:?}, 0.0, 0.0]\nnormal = [0.0, -1.0, 0.0]\nradius = 0.1\nradiance = [1.0, 1.0, 1.0]\n"
+        )
+    };
+    let ball = |x: f64, radius: f64, material: &str| {
+        format!(
+            "[[sphere]]\ncenter = [{x:?}, 0.0, 0.0]\nradius = {radius:?}\nmaterial = \"{material}\"\n"
+        )
+    };
+    let mut text = format!(
+        "[camera]\neye = [0.0, 0.0, 8.0]\nlook_at = [0.0, 0.0, 0.0]\nvfov = 40.0\nresolution = [16, 16]\n\
+         [material.{name}]\n{keys}\n[material.solid]\ntype = \"dielectric\"\n\
+         [material.bubble]\ntype = \"dielectric\"\nior = 0.65789\n\
+         [[plane]]\npoint = [0.0, -1.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\nmaterial = \"{name}\"\n"
+    );
+    text += &(lamp(0.0) + &ball(0.0, 0.9, "solid") + &ball(0.0, 0.8, "bubble"));
+    text += &(lamp(2.0) + &ball(2.0, 0.9, "solid") + &lamp(4.0));
+    text
+}
+
 #[test]
 fn every_mode_is_valid() {
     let everything = scene(&text(EVERY_SHAPE, EVERY_MATERIAL, 3, false).expect("has primitives"));
     let only_mirrors = scene(&text(1, 2, 1, false).expect("has primitives"));
     let smooth_mirrors = with_implicits(4, 2, true);
     let smooth_gloss = with_implicits(4, 8, true);
-    for scene in [&everything, &only_mirrors, &smooth_mirrors, &smooth_gloss] {
+    let [matt_bulbs, glossy_bulbs] = [0, 3].map(|m| scene(&with_bulbs(m)));
+    for scene in [
+        &everything,
+        &only_mirrors,
+        &smooth_mirrors,
+        &smooth_gloss,
+        &matt_bulbs,
+        &glossy_bulbs,
+    ] {
         for light in 1..8 {
             for integrator in [Integrator::Path, Integrator::Whitted] {
                 for shadow_rays in [1, 4] {
@@ -227,7 +259,8 @@ fn a_kernel_holds_only_what_its_scene_needs() {
     let plane = kernel(text(2, 1, 1, false), None);
     let everything = ACCESSES
         .map(|access| kernel(text(EVERY_SHAPE, EVERY_MATERIAL, 3, false), Some(access)))
-        .concat();
+        .concat()
+        + &kernel(Some(with_bulbs(0)), None);
     for unneeded in [
         "fn cylinder_",
         "fn sphere_",
@@ -239,6 +272,7 @@ fn a_kernel_holds_only_what_its_scene_needs() {
         "var<storage, read> surfaces",
         "var records",
         "trips_left",
+        "fn bulb_ray",
     ] {
         assert!(everything.contains(unneeded), "no kernel has {unneeded}");
         assert!(

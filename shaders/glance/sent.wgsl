@@ -18,8 +18,8 @@ struct Sight {
 
 fn sight_of(mark: u32) -> Sight {
     let depth = mark & 0xffu;
-    let directly = ((mark >> DIRECT_SHIFT) == 1u) | !GLANCE_CHAINS;
-    let across = select(CHAIN_GLANCES, GLANCES, directly);
+    let many = ((mark >> MANY_SHIFT) == 1u) | !GLANCE_CHAINS;
+    let across = select(CHAIN_GLANCES, GLANCES, many);
     return Sight(select(0u, across * across, depth > 0u), across, depth, (mark >> BRANCH_SHIFT) & 0xffu);
 }
 

@@ -404,7 +404,7 @@ impl Features {
             ("GLANCES", glances::GLANCES),
             ("CHAIN_GLANCES", glances::in_chains(settings)),
             ("BRANCH_SHIFT", glances::BRANCH_SHIFT),
-            ("DIRECT_SHIFT", glances::DIRECT_SHIFT),
+            ("MANY_SHIFT", glances::MANY_SHIFT),
         ] {
             constant(&mut s, name, "u32", format!("{value}u"));
         }

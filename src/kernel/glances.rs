@@ -5,7 +5,7 @@ use super::trips;
 use crate::settings::Settings;
 use crate::world::{World, WorldLight};
 
-/// The square of this is the number of glances of a sample, in a pixel that may see a light directly.
+/// The square of this is the number of glances of a sample, in a pixel that may see a light directly, or a very small image of one.
 pub(super) const GLANCES: u32 = 4;
 
 /// The same, in a pixel that sees lights only by way of mirrors and glass, if paths may have more than two vertices. Then indirect light
@@ -23,8 +23,8 @@ const LONGEST_GLANCE: u32 = 6;
 /// The first of the eight bits of a mark that hold the vertex of glass at which half of the glances are refracted and half reflected.
 pub(crate) const BRANCH_SHIFT: u32 = 8;
 
-/// The bit of a mark that says whether a light may be seen directly.
-pub(crate) const DIRECT_SHIFT: u32 = 16;
+/// The bit of a mark that says whether the pixel gets more glances.
+pub(crate) const MANY_SHIFT: u32 = 16;
 
 /// The most loop trips that glances may use, of those that an older driver grants: see [`trips`].
 const TRIPS_FOR_GLANCES: u64 = 16_384;

@@ -19,7 +19,7 @@ pub(crate) mod trips;
 pub use access::{Access, BAKED_LIMIT};
 pub(crate) use emit::grid::{FIRST_BINDING, holds_heights, volumes};
 pub(crate) use features::GROUP_SIDE;
-pub(crate) use glances::{BRANCH_SHIFT, DIRECT_SHIFT};
+pub(crate) use glances::{BRANCH_SHIFT, MANY_SHIFT};
 pub(crate) use streams::pilot_seed;
 
 use crate::settings::Settings;

@@ -25,6 +25,9 @@ const MAX_FINE: u32 = 4;
 /// Points of a light's rim whose images are looked for.
 const RIM_POINTS: u32 = 16;
 
+/// An image is small if the box around it has less than this, in pixels.
+const SMALL_IMAGE: f64 = 4.0;
+
 /// The share of an image's size that is added around these points.
 const RIM_SLACK: f64 = 0.1;
 
@@ -63,6 +66,8 @@ struct Image {
     pixels: FilmBox,
     last_vertex: u8,
     branch_vertex: u8,
+    /// It covers a small part of its pixels.
+    small: bool,
 }
 
 impl Chains {
@@ -250,6 +255,7 @@ impl Image {
             for x in touched(min_x, max_x, rect.x0, rect.x1) {
                 let mark = &mut marks[((y - rect.y0) * rect.width() + x - rect.x0) as usize];
                 mark.last_vertex = mark.last_vertex.max(self.last_vertex);
+                mark.many |= self.small;
                 if mark.branch_vertex == 0 {
                     mark.branch_vertex = self.branch_vertex;
                 }
@@ -285,6 +291,7 @@ fn images(world: &World, size: [u32; 2], last_vertex: u32) -> Vec<Image> {
             });
             let whole = seen.reduce(FilmBox::union).filter(|_| last <= last_vertex);
             images.extend(whole.map(|pixels| Image {
+                small: pixels.area() < SMALL_IMAGE,
                 pixels: pixels.widened(RIM_SLACK),
                 last_vertex: last as u8,
                 branch_vertex: branch as u8,

@@ -86,7 +86,7 @@ impl DirectLights {
                 for x in columns.clone() {
                     let mark = &mut row[(x - rect.x0) as usize];
                     let w = left + f64::from(x) * self.dx;
-                    if !mark.direct && light.touches(w, w.length(), half_diagonal) {
+                    if !mark.many && light.touches(w, w.length(), half_diagonal) {
                         *mark = mark.with_direct();
                     }
                 }

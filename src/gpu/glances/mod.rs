@@ -18,7 +18,7 @@ mod lights;
 mod tests;
 
 use crate::film::coverage::Rect;
-use crate::kernel::{BRANCH_SHIFT, DIRECT_SHIFT};
+use crate::kernel::{BRANCH_SHIFT, MANY_SHIFT};
 use crate::settings::{LightParts, Settings};
 use crate::world::{World, WorldCamera};
 use chains::Chains;
@@ -33,29 +33,29 @@ struct Mark {
     last_vertex: u8,
     /// The vertex of glass at which half of the glances are reflected and the other half refracted; 0: chance decides everywhere.
     branch_vertex: u8,
-    /// Whether the pixel may show a light directly. It then gets more glances.
-    direct: bool,
+    /// Whether the pixel gets more glances: it may show a light directly, or a very small image of one.
+    many: bool,
 }
 
 impl Mark {
-    /// The kernel's form: `last_vertex` in bits 0 to 7, `branch_vertex` in the 8 bits from [`BRANCH_SHIFT`] on, and `direct` at
-    /// bit [`DIRECT_SHIFT`].
+    /// The kernel's form: `last_vertex` in bits 0 to 7, `branch_vertex` in the 8 bits from [`BRANCH_SHIFT`] on, and `many` at
+    /// bit [`MANY_SHIFT`].
     fn pack(self) -> u32 {
         let Self {
             last_vertex,
             branch_vertex,
-            direct,
+            many,
         } = self;
         u32::from(last_vertex)
             | u32::from(branch_vertex) << BRANCH_SHIFT
-            | u32::from(direct) << DIRECT_SHIFT
+            | u32::from(many) << MANY_SHIFT
     }
 
     /// The same mark, with a light that may be seen directly.
     fn with_direct(self) -> Self {
         Self {
             last_vertex: self.last_vertex.max(1),
-            direct: true,
+            many: true,
             ..self
         }
     }
@@ -158,6 +158,11 @@ impl FilmBox {
             min_y: self.min_y.min(other.min_y),
             max_y: self.max_y.max(other.max_y),
         }
+    }
+
+    /// In pixels.
+    fn area(&self) -> f64 {
+        (self.max_x - self.min_x) * (self.max_y - self.min_y)
     }
 
     /// The box with this share of its size added on each side.

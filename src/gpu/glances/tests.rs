@@ -7,12 +7,12 @@ fn a_packed_mark_is_what_the_kernel_takes_apart() {
     let mark = Mark {
         last_vertex: 6,
         branch_vertex: 3,
-        direct: true,
+        many: true,
     };
     let packed = mark.pack();
     assert_eq!(packed & 0xff, 6);
     assert_eq!((packed >> BRANCH_SHIFT) & 0xff, 3);
-    assert_eq!(packed >> DIRECT_SHIFT, 1);
+    assert_eq!(packed >> MANY_SHIFT, 1);
     assert_eq!(Mark::default().pack(), 0);
 }
 
@@ -93,14 +93,14 @@ fn edge_in_the_ball() -> f64 {
 const DIRECT: Mark = Mark {
     last_vertex: 1,
     branch_vertex: 0,
-    direct: true,
+    many: true,
 };
 
 /// The mark of a pixel that shows the edge of a light in a mirror.
 const MIRRORED: Mark = Mark {
     last_vertex: 2,
     branch_vertex: 0,
-    direct: false,
+    many: false,
 };
 
 const WHOLE: Rect = Rect {
