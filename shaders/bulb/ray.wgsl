@@ -4,8 +4,6 @@
 
 struct Bulb {
     center: vec3f,
-    // The radius of the outer shell.
-    radius: f32,
     // k inside and outside of the inner shell, then of the outer one. A bulb of one shell has an inner one that changes nothing.
     inverse_impacts: vec4f,
     // The index inside over the one outside, of both shells.
@@ -14,9 +12,9 @@ struct Bulb {
     indices: vec2f,
     // Of both shells together, and of the inner one.
     transmittance: vec3f,
+    inner_transmittance: vec3f,
     // How many shells there are; 0: the light is in no bulb.
     shells: u32,
-    inner_transmittance: vec3f,
     // The probability of ways that are reflected; 0: these are not sampled.
     reflected: f32,
     // The numbers of the shells' surfaces, and the medium outside.
@@ -98,8 +96,10 @@ struct BulbRay {
     // Unit direction from the receiver to the outer shell, and the direction in which the ray leaves the light.
     d: vec3f,
     leaves: vec3f,
-    // The solid angle at the receiver for an area of the light, without the cosine at the light.
+    // The solid angle at the receiver for an area of the light is spread * per_length^2 times the cosine at the light. Lengths may be
+    // large, so they are apart.
     spread: f32,
+    per_length: f32,
     // What the shells let through.
     transmitted: vec3f,
 }
@@ -128,7 +128,8 @@ fn bulb_ray(bulb: Bulb, plane: BulbPlane, leaves: vec2f, far: f32, way: u32) -> 
     return BulbRay(
         renormalized(-outwards * cos - onwards * sin),
         plane.along * leaves.x + plane.across * leaves.y,
-        n * n / fmax(widens * cos, TINY),
+        1.0 / fmax(widens * cos, TINY),
+        n,
         passed
     );
 }
@@ -149,7 +150,8 @@ fn meets_own_light(bulb: Bulb, plane: BulbPlane, leaves: vec2f, way: u32, light:
     let impact = plane.start * leaves.y;
     let sines = impact * bulb.inverse_impacts.xyz;
     let cosines = sqrt(max(vec3f(1.0) - sines * sines, vec3f(0.0)));
-    // Twice each arcsine. The nearest point to the centre is swept when the first is subtracted and a right angle is added.
+    // Cosine and sine of twice each arcsine. The inner shell's reflection sends the ray nearest to the centre at the angle `leaves`, less
+    // twice the first, plus a right angle. On the way to the outer shell and back it sweeps twice the second less twice the third.
     let cos = 1.0 - 2.0 * sines * sines;
     let sin = 2.0 * sines * cosines;
     var at = rotated(rotated(leaves, vec2f(cos.x, -sin.x)), vec2f(0.0, 1.0));

@@ -1,7 +1,7 @@
 // Light of bulbs, sampled from outside: shadow rays that glass refracts on their way.
 //
-// A path that has scattered outside and meets the light on one of the sampled ways has its light from here. Light that the shells have
-// reflected more often is left to chance and to light paths.
+// A path that has scattered outside and meets the light on one of the sampled ways has its light from here; on glossy surfaces both are
+// weighed. Light that the shells have reflected more often is left to chance and to light paths.
 
 // What a path must know of the last vertex that scattered into more than one direction.
 struct BulbTrail {
@@ -63,8 +63,8 @@ fn gather_bulbs(asks: bool, path: ptr<function, Path>, x: ptr<function, Interact
 fn bulb_inverse_pdf(bulb: Bulb, ray: BulbRay, light: DiskLight, way: u32) -> f32 {
     let each = bulb.reflected * select(0.5, 1.0, bulb.shells == 1u);
     let probability = select(each, 1.0 - bulb.reflected, way == BULB_STRAIGHT);
-    let area = PI * light.radius * light.radius;
-    return ray.spread * dot(ray.leaves, light.normal) * (area / fmax(probability, TINY));
+    let size = light.radius * ray.per_length;
+    return ray.spread * dot(ray.leaves, light.normal) * (PI * size * size / fmax(probability, TINY));
 }
 
 // The share of a light met by chance that counts: `share`, unless it was sampled.

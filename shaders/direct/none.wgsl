@@ -1,4 +1,4 @@
-// No light sampling: the scene has no light, or no surface that scatters into more than one direction, or the picture keeps no such light.
+// No light sampling by straight shadow rays: the scene has no light, or bulbs alone, or no surface that scatters into more than one direction, or the picture keeps no such light.
 
 struct DirectLight {
     radiance: vec3f,

@@ -9,11 +9,13 @@ use crate::stats::luminance;
 use crate::world::World;
 use crate::world::bulbs::{self, Bulb};
 use glam::DVec3;
-use std::f64::consts::PI;
 use std::fmt::Write as _;
 
 /// The probability of a ray that the shells reflect once. Glass reflects about a twentieth of the light at each.
 const REFLECTED: f64 = 0.125;
+
+/// The least weight of a bulb in the choice among bulbs, before the distance counts: no weight is rounded to 0.
+const LEAST_WEIGHT: f64 = 1e-6;
 
 /// The bulbs that the kernel samples. Their light has been scattered by matt or glossy things, and then crossed one or two shells.
 /// [Whitted's integrator](Integrator::Whitted) gathers no such light.
@@ -96,26 +98,31 @@ fn with_none(world: &World, bulbs: impl Iterator<Item = (u32, Scalars)>) -> Vec<
     all
 }
 
-/// Whether bulbs are all lights there are, and their shells all that is specular: then no other light comes by way of glass.
+/// Whether bulbs are all lights there are, and their shells all that is specular: then the only other light that
+/// comes by way of glass has been reflected twice, and there is hardly any.
 fn are_all(world: &World, bulbs: &[Bulb]) -> bool {
     let is_shell = |n: usize| bulbs.iter().flat_map(|b| b.shells).any(|s| s.number == n);
     let mut numbered = (world.lights.len()..).zip(&world.primitives);
     bulbs.len() == world.lights.len()
+        && bulbs.iter().all(|b| b.reflects)
         && numbered.all(|(n, p)| !world.materials[p.material].kind().is_specular() || is_shell(n))
 }
 
 /// Lines that set the weights `w_0` and so on at `p`, and their `sum`.
 fn weights(world: &World, bulbs: &[Bulb]) -> String {
     let mut s = String::new();
+    let shines = |b: &Bulb| luminance(world.lights[b.light].radiance.to_array());
+    let most = bulbs.iter().map(shines).fold(0.0, f64::max);
     for (i, b) in bulbs.iter().enumerate() {
-        let l = &world.lights[b.light];
-        let power = luminance(l.radiance.to_array()) * PI * l.radius * l.radius;
-        let (center, power) = (vector(b.center), float(power.max(1e-20)));
-        let near = float(b.shells[1].radius.powi(2));
+        // No length has a unit, so that all numbers are within f32 whatever the scene's size.
+        let outer = b.shells[1].radius;
+        let size = world.lights[b.light].radius / outer;
+        let power = float((shines(b) / most * size * size).max(LEAST_WEIGHT));
+        let (center, inverse) = (vector(b.center), float(1.0 / outer));
         let _ = write!(
             s,
-            "    let v_{i} = p - {center};
-    let w_{i} = {power} / (dot(v_{i}, v_{i}) + {near});
+            "    let v_{i} = (p - {center}) * {inverse};
+    let w_{i} = {power} / (1.0 + fmin(dot(v_{i}, v_{i}), 1.0e30));
 "
         );
     }
@@ -141,13 +148,13 @@ fn scalars(b: &Bulb) -> Scalars {
         inner.transmittance * outer.transmittance
     };
     let mut all = Scalars::new();
-    let mut vector = |field: &str, values: &[String]| {
+    let mut add = |field: &str, values: &[String]| {
         for (axis, value) in ["x", "y", "z", "w"].iter().zip(values) {
             all.push((format!("{field}.{axis}"), value.clone()));
         }
     };
-    vector("center", &single(b.center).map(|v| float(f64::from(v))));
-    vector(
+    add("center", &single(b.center).map(|v| float(f64::from(v))));
+    add(
         "inverse_impacts",
         &[
             k(indices[0], inner.radius),
@@ -156,14 +163,14 @@ fn scalars(b: &Bulb) -> Scalars {
             k(outer.indices[1], outer.radius),
         ],
     );
-    vector(
+    add(
         "etas",
         &[
             float(indices[0] / indices[1]),
             float(outer.indices[0] / outer.indices[1]),
         ],
     );
-    vector(
+    add(
         "inner_transmittance",
         &single(if single_shell {
             DVec3::ONE
@@ -172,13 +179,12 @@ fn scalars(b: &Bulb) -> Scalars {
         })
         .map(|v| float(f64::from(v))),
     );
-    vector("indices", &[float(indices[0]), float(outer.indices[1])]);
-    vector(
+    add("indices", &[float(indices[0]), float(outer.indices[1])]);
+    add(
         "transmittance",
         &single(transmittance).map(|v| float(f64::from(v))),
     );
     let numbers = [
-        ("radius", float(outer.radius)),
         ("shells", format!("{}u", b.count)),
         ("reflected", float(if b.reflects { REFLECTED } else { 0.0 })),
         ("surface", format!("{}u", outer.number)),

@@ -13,8 +13,8 @@ use std::fmt::Write as _;
 
 /// Light paths of a pass for each pixel, at least and where mirrors and glass get all of the light. In between it is in proportion to the root
 /// of what they get. By squared error and CPU time the best numbers were 1/64 and fewer where they get 0.2 to 2 % of the light (clouds
-/// with a sixteenth of glass, torus), 1/16 to 1/8 for 7 to 30 % (caustic, three_materials, cylinders), and 1/4 to 1/2 for all of it (lamps in
-/// glass); half as many or twice as many had at least 0.8 times the best efficiency.
+/// with a sixteenth of glass, torus), 1/16 to 1/8 for 7 to 30 % (caustic, three_materials, cylinders), and 1/4 to 1/2 for all of it (lamps
+/// in glass, when their light was not sampled through it); half as many or twice as many had at least 0.8 times the best efficiency.
 const PATHS_A_PIXEL: [f64; 2] = [1.0 / 64.0, 1.0 / 4.0];
 
 /// The fewest and the most light paths of a pass. A small region needs all of them, however large the picture is.

@@ -12,7 +12,7 @@ use super::features::Features;
 use super::glances::MAX_GLANCES;
 use super::trees::Parted;
 use crate::settings::Settings;
-use crate::world::{Geometry, World, WorldPrimitive, light_tree, visibility};
+use crate::world::{AIR, Geometry, World, WorldLight, WorldPrimitive, light_tree, visibility};
 
 /// The most loop trips that an invocation may take on this adapter. A driver that names no version counts as old.
 pub(crate) fn limit(adapter: &str, driver: &str) -> u64 {
@@ -63,7 +63,14 @@ pub(super) fn at_vertex(
     } else {
         0
     };
-    1 + inner + shadow_loop + hidden + onto_surfaces(world)
+    // A ray to a light in a glass ball.
+    let in_glass = |l: &WorldLight| l.medium.is_some_and(|m| m != AIR);
+    let bulb = if world.lights.iter().any(in_glass) {
+        ray
+    } else {
+        0
+    };
+    1 + inner + bulb + shadow_loop + hidden + onto_surfaces(world)
 }
 
 /// The loop trips that moving a hit onto an implicit surface takes. Meeting one counts its own.

@@ -43,7 +43,8 @@ pub(crate) struct Aims {
     pub targets: Vec<Target>,
     /// Sums of the probabilities of the pairs so far, each pair's own included, times 2^24.
     pub cumulative: Vec<u32>,
-    /// The light that the surfaces get, over all that the lights send out. Surfaces behind others count too, so it may be above 1.
+    /// The light that the surfaces get and light paths look for, over all that the lights send out. Surfaces behind others count too, so it
+    /// may be above 1.
     pub share: f64,
 }
 
@@ -69,7 +70,7 @@ impl Aims {
                 .map(|l| l.0)
         };
         let left: Vec<f64> = (0..world.lights.len())
-            .map(|l| left_to_light_paths(bulbs, l))
+            .map(|l| left_to_light_paths(world, &targets, bulbs, l))
             .collect();
         let from_all = |t: &Target| -> f64 { lights().map(|l| flux(world, l, t)).sum() };
         let most = MOST_PAIRS / world.lights.len().max(1);
@@ -121,14 +122,18 @@ impl Aims {
     }
 }
 
-/// The share of a light's light that light paths look for. What else there is of a bulb has been reflected by its glass, once or twice at
-/// least, and glass reflects about a twentieth.
-fn left_to_light_paths(bulbs: &[Bulb], light: usize) -> f64 {
-    match bulbs.iter().find(|b| b.light == light) {
-        None => 1.0,
-        Some(b) if b.reflects => 0.01,
-        Some(_) => 0.1,
-    }
+/// The share of a light's light that light paths look for. Of a bulb it is what its own glass has reflected more often than is sampled (glass
+/// reflects about a twentieth), and what other mirrors and glass get.
+fn left_to_light_paths(world: &World, targets: &[Target], bulbs: &[Bulb], light: usize) -> f64 {
+    let Some(bulb) = bulbs.iter().find(|b| b.light == light) else {
+        return 1.0;
+    };
+    let l = &world.lights[light];
+    let is_shell = |t: &&Target| bulb.shells.iter().any(|s| s.number == t.number);
+    let others = targets.iter().filter(|t| !is_shell(t));
+    let sent: f64 = others.map(|t| flux(world, l, t)).sum();
+    let own = if bulb.reflects { 0.01 } else { 0.1 };
+    (own + sent / power(l).max(f64::MIN_POSITIVE)).min(1.0)
 }
 
 /// Whether every point of a light shines into the room, and into one medium. Light from points that no path from the eye reaches must

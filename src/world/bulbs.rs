@@ -2,7 +2,7 @@
 //!
 //! A shadow ray to a light inside glass must be refracted on its way. Through a sphere it stays in the plane of its two ends and the centre,
 //! and n r sin(angle to the radius), its *impact*, is the same at every radius r and index n (Bouguer's law). So the angle that a ray sweeps
-//! around the centre is a sum of arcsines of its impact, and `shaders/bulb/sampled.wgsl` finds the one ray between two points by
+//! around the centre is a sum of arcsines of its impact, and `shaders/bulb/ray.wgsl` finds the one ray between two points by
 //! Newton's method.
 //!
 //! There is one ray only if the swept angle grows with the angle at which light leaves. Newton's method is quick if it grows evenly. Both are
@@ -21,7 +21,7 @@ const MOST: usize = 24;
 /// The most pairs of a light in glass and a surface that are looked at. With more, none of the lights is sampled through glass.
 const MOST_PAIRS: usize = 10_000_000;
 
-/// The steps of Newton's method that the kernel takes. `shaders/bulb/sampled.wgsl` has as many.
+/// The steps of Newton's method that the kernel takes. `shaders/bulb/ray.wgsl` has as many.
 const STEPS: usize = 4;
 
 /// What may be left of the angle after these steps, in radians: less than f32 resolves of a scene.
@@ -103,6 +103,9 @@ impl Bulb {
             } else if c.distance(center) > slack(*radius) {
                 break;
             }
+            if shells.len() == 2 {
+                return None;
+            }
             shells.push(Shell {
                 number: world.lights.len() + number,
                 radius: *radius,
@@ -121,22 +124,26 @@ impl Bulb {
             medium,
         };
         let farthest = farthest(l, center);
-        let in_ball = |other: &&WorldLight| bulb.side_of(other) != DiskSide::Outside;
-        let is_only = world.lights.iter().filter(in_ball).count() == 1;
-        let once = [Way::Inner, Way::Outer];
-        bulb.reflects = is_only && once.iter().all(|w| bulb.has_one_ray(*w, farthest));
-        let fits = bulb.count <= 2
-            && has_receivers(world, bulb.medium)
+        let fits = has_receivers(world, medium)
             && is_alone(world, light, &bulb)
             && bulb.has_one_ray(Way::Straight, farthest);
-        fits.then_some(bulb)
+        if !fits {
+            return None;
+        }
+        let in_ball = |other: &&WorldLight| bulb.side_of(1, other) != DiskSide::Outside;
+        let is_only = world.lights.iter().filter(in_ball).count() == 1;
+        bulb.reflects = is_only
+            && [Way::Inner, Way::Outer]
+                .iter()
+                .all(|way| bulb.has_one_ray(*way, farthest));
+        Some(bulb)
     }
 
-    /// Where a light lies relative to the outer shell.
-    fn side_of(&self, l: &WorldLight) -> DiskSide {
+    /// Where a light lies relative to one of the shells.
+    fn side_of(&self, shell: usize, l: &WorldLight) -> DiskSide {
         let ball = Geometry::Sphere {
             center: self.center,
-            radius: self.shells[1].radius,
+            radius: self.shells[shell].radius,
         };
         ball.side_of_disk(l.center, l.normal, l.radius)
     }
@@ -183,7 +190,8 @@ impl Bulb {
         let mut alpha = target;
         for _ in 0..STEPS {
             let [swept, derivative] = self.sweep(way, d, alpha, x)?;
-            alpha -= (swept - target).sin() / derivative;
+            // The kernel's step turns a direction.
+            alpha -= ((swept - target).sin() / derivative).atan();
         }
         let [swept, _] = self.sweep(way, d, alpha, x)?;
         ((swept - target).abs() <= LEFT).then_some(alpha)
@@ -216,7 +224,7 @@ impl Bulb {
         }
     }
 
-    /// The vertex at which a path from outside is reflected on this way, and that of the light; the first has 1.
+    /// As in `shaders/bulb/ways.wgsl`: the vertex at which a path from outside is reflected on this way, and that of the light; the first has 1.
     pub fn vertices(&self, way: Way) -> [u32; 2] {
         match (way, self.count) {
             (Way::Straight, n) => [0, n + 1],
@@ -276,7 +284,14 @@ fn has_receivers(world: &World, medium: u32) -> bool {
         (world.primitives.iter()).filter(|p| !world.materials[p.material].kind().is_specular());
     match solid.filter(|_| medium != AIR) {
         None => true,
-        Some(solid) => scattering.any(|p| solid.geometry.holds(p.geometry.core().0)),
+        Some(solid) => scattering.any(|p| {
+            let middle = match p.geometry {
+                Geometry::Disk { center, .. } => center,
+                Geometry::HugeSphere { pole, .. } => pole,
+                _ => p.geometry.core().0,
+            };
+            solid.geometry.holds(middle)
+        }),
     }
 }
 
@@ -284,14 +299,14 @@ fn has_receivers(world: &World, medium: u32) -> bool {
 fn is_alone(world: &World, light: usize, bulb: &Bulb) -> bool {
     let l = &world.lights[light];
     let outer = bulb.shells[1];
-    let clear = |other: &WorldLight| match bulb.side_of(other) {
-        DiskSide::Outside => true,
-        DiskSide::Cut => false,
-        // It lies behind the light.
-        DiskSide::Inside => {
+    let clear = |other: &WorldLight| match [0, 1].map(|shell| bulb.side_of(shell, other)) {
+        [_, DiskSide::Outside] => true,
+        // Within the inner shell rays are straight, so what lies behind the light is in no ray's way. In the glass they bend.
+        [DiskSide::Inside, _] => {
             let reach = other.radius * l.normal.cross(other.normal).length();
             other.face != l.face && l.normal.dot(other.center) + reach <= l.offset
         }
+        _ => false,
     };
     let others = (0..world.lights.len()).filter(|&k| k != light);
     let is_shell = |number: usize| bulb.shells.iter().any(|s| s.number == number);
@@ -429,6 +444,11 @@ mod tests {
             ),
             None
         );
+        let layer = hollow.clone()
+            + &lamp
+                .replace("[0.0, 0.0, 0.0]", "[0.0, 0.95, 0.0]")
+                .replace("= 0.1", "= 0.01");
+        assert_eq!(bulbs(&world(&(lamp.clone() + &layer))), [], "in the glass");
         // Another light behind it blocks no straight ray, but reflected ones; one before it blocks both.
         let behind = lamp
             .replace("[0.0, 0.0, 0.0]", "[0.0, 0.2, 0.0]")

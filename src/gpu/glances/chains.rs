@@ -56,7 +56,7 @@ pub(super) struct Chains {
     pixels: Vec<FilmBox>,
     /// Points along the side of a pixel.
     fine: u32,
-    /// Images that may be too small for these points.
+    /// Images that these points may miss, because they may be small.
     images: Vec<Image>,
 }
 

@@ -10,7 +10,8 @@
 //!
 //! - if it may show a light directly ([`lights`]);
 //! - if it may show the edge of a light's image in a mirror or in glass, or any part of an image where chance decides
-//!   between reflection and refraction ([`chains`]).
+//!   between reflection and refraction ([`chains`]);
+//! - if it may show the image of a light that is reflected once by the glass ball around it, however small.
 
 mod chains;
 mod lights;
