@@ -186,27 +186,31 @@ fn implicit_surfaces_of_every_material_are_valid() {
     }
 }
 
-/// A lamp in a hollow glass ball, one in a solid ball, and one in the open, over a floor of this material.
-fn with_bulbs(material: usize) -> String {
+/// A lamp in a hollow glass ball, one in a solid ball, and one in the open, over a floor of this material. The first lamp has this radiance.
+fn with_bulbs(material: usize, size: f64, radiance: f64) -> String {
     let (name, keys) = MATERIALS[material];
-    let lamp = |x: f64| {
+    let lamp = |x: f64, radiance: f64| {
+        let (x, r) = (x * size, 0.1 * size);
         format!(
-            "[[light]]\ncenter = [{x:?}, 0.0, 0.0]\nnormal = [0.0, -1.0, 0.0]\nradius = 0.1\nradiance = [1.0, 1.0, 1.0]\n"
+            "[[light]]\ncenter = [{x:e}, 0.0, 0.0]\nnormal = [0.0, -1.0, 0.0]\nradius = {r:e}\n\
+             radiance = [{radiance:e}, 0.0, 0.0]\n"
         )
     };
     let ball = |x: f64, radius: f64, material: &str| {
+        let (x, r) = (x * size, radius * size);
         format!(
-            "[[sphere]]\ncenter = [{x:?}, 0.0, 0.0]\nradius = {radius:?}\nmaterial = \"{material}\"\n"
+            "[[sphere]]\ncenter = [{x:e}, 0.0, 0.0]\nradius = {r:e}\nmaterial = \"{material}\"\n"
         )
     };
     let mut text = format!(
         "[camera]\neye = [0.0, 0.0, 8.0]\nlook_at = [0.0, 0.0, 0.0]\nvfov = 40.0\nresolution = [16, 16]\n\
          [material.{name}]\n{keys}\n[material.solid]\ntype = \"dielectric\"\n\
          [material.bubble]\ntype = \"dielectric\"\nior = 0.65789\n\
-         [[plane]]\npoint = [0.0, -1.0, 0.0]\nnormal = [0.0, 1.0, 0.0]\nmaterial = \"{name}\"\n"
+         [[plane]]\npoint = [0.0, {:e}, 0.0]\nnormal = [0.0, 1.0, 0.0]\nmaterial = \"{name}\"\n",
+        -size
     );
-    text += &(lamp(0.0) + &ball(0.0, 0.9, "solid") + &ball(0.0, 0.8, "bubble"));
-    text += &(lamp(2.0) + &ball(2.0, 0.9, "solid") + &lamp(4.0));
+    text += &(lamp(0.0, radiance) + &ball(0.0, 0.9, "solid") + &ball(0.0, 0.8, "bubble"));
+    text += &(lamp(2.0, 1.0) + &ball(2.0, 0.9, "solid") + &lamp(4.0, 1.0));
     text
 }
 
@@ -216,7 +220,7 @@ fn every_mode_is_valid() {
     let only_mirrors = scene(&text(1, 2, 1, false).expect("has primitives"));
     let smooth_mirrors = with_implicits(4, 2, true);
     let smooth_gloss = with_implicits(4, 8, true);
-    let [matt_bulbs, glossy_bulbs] = [0, 3].map(|m| scene(&with_bulbs(m)));
+    let [matt_bulbs, glossy_bulbs] = [0, 3].map(|m| scene(&with_bulbs(m, 1.0, 1.0)));
     for scene in [
         &everything,
         &only_mirrors,
@@ -250,6 +254,16 @@ fn every_mode_is_valid() {
 }
 
 #[test]
+fn bulbs_of_any_brightness_and_size_are_valid() {
+    for radiance in [1e-15, 1.0, 1e15] {
+        for size in [1e-14, 1.0, 1e14] {
+            let text = with_bulbs(0, size, radiance);
+            validate_all(&scene(&text), &Overrides::default(), &text);
+        }
+    }
+}
+
+#[test]
 fn a_kernel_holds_only_what_its_scene_needs() {
     let kernel = |text: Option<String>, access| {
         let scene = scene(&text.expect("has primitives"));
@@ -260,7 +274,7 @@ fn a_kernel_holds_only_what_its_scene_needs() {
     let everything = ACCESSES
         .map(|access| kernel(text(EVERY_SHAPE, EVERY_MATERIAL, 3, false), Some(access)))
         .concat()
-        + &kernel(Some(with_bulbs(0)), None);
+        + &kernel(Some(with_bulbs(0, 1.0, 1.0)), None);
     for unneeded in [
         "fn cylinder_",
         "fn sphere_",

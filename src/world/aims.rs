@@ -224,7 +224,7 @@ mod tests {
     use super::*;
     use crate::scene::parse::parse_str;
 
-    fn aims(things: &str) -> Option<Aims> {
+    fn world(things: &str) -> World {
         let text = format!(
             "[camera]\neye = [0, 1, 4]\nlook_at = [0, 1, 0]\nvfov = 40\nresolution = [8, 8]\n\
              [material.white]\ntype = 'diffuse'\nreflectance = [0.5, 0.5, 0.5]\n\
@@ -232,7 +232,11 @@ mod tests {
              [[plane]]\npoint = [0, -1, 0]\nnormal = [0, 1, 0]\nmaterial = 'white'\n{things}"
         );
         let scene = parse_str("room.toml".as_ref(), &text).expect("a scene");
-        Aims::new(&World::new(&scene, [8, 8]), &[])
+        World::new(&scene, [8, 8])
+    }
+
+    fn aims(things: &str) -> Option<Aims> {
+        Aims::new(&world(things), &[])
     }
 
     fn light(center: &str) -> String {
@@ -276,6 +280,25 @@ mod tests {
              [[plane]]\npoint = [-5, 0, 0]\nnormal = [1, 0, 0]\nmaterial = 'silver'\n";
         let beside = share(mirror);
         assert!((beside - 0.25).abs() < 1e-3, "half of half of it: {beside}");
+    }
+
+    #[test]
+    fn of_bulbs_light_paths_look_for_what_other_mirrors_get() {
+        let share = |things: &str| {
+            let world = world(things);
+            let bulbs = crate::world::bulbs::bulbs(&world);
+            assert_eq!(bulbs.len(), 1);
+            Aims::new(&world, &bulbs).expect("aims").share
+        };
+        let bulb = light("[0, 2, 0]") + &ball("[0, 2, 0]", 1.5);
+        assert!(share(&bulb) <= 0.1, "{}", share(&bulb));
+        let mirror = "[material.silver]\ntype = 'mirror'\nreflectance = [0.8, 0.8, 0.8]\n\
+             [[plane]]\npoint = [-5, 0, 0]\nnormal = [1, 0, 0]\nmaterial = 'silver'\n";
+        let beside = share(&(bulb + mirror));
+        assert!(
+            beside > 0.4,
+            "half of 0.8 to the wall, and all to the glass: {beside}"
+        );
     }
 
     #[test]
