@@ -1,4 +1,4 @@
-// The ray from a light in a bulb to a point outside: see src/world/bulbs.rs. Shells are concentric spheres, so the ray stays in the plane of
+// The ray from a light in a bulb to a point outside: see src/world/bulbs/mod.rs. Shells are concentric spheres, so the ray stays in the plane of
 // its ends and the centre, and its impact, n r sin(angle to the radius), is the same everywhere. At a radius r in a medium of index n that
 // sine is the impact times k = 1 / (n r).
 
@@ -134,7 +134,7 @@ fn bulb_ray(bulb: Bulb, plane: BulbPlane, leaves: vec2f, far: f32, way: u32) -> 
     );
 }
 
-// The cosine and sine of the angle at which the ray leaves the light's point to reach the receiver. src/world/bulbs.rs tries whether
+// The cosine and sine of the angle at which the ray leaves the light's point to reach the receiver. src/world/bulbs/mod.rs tries whether
 // four steps are enough.
 fn leaving_angle(bulb: Bulb, plane: BulbPlane, far: f32, way: u32) -> vec2f {
     var leaves = select(plane.between, -plane.between, way != BULB_STRAIGHT);
