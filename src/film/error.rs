@@ -42,8 +42,16 @@ const BRIGHTER: f64 = 1.0;
 /// pool's.
 const RADII: [u32; 5] = [1, 3, 7, 15, 31];
 
-/// The largest relative uncertainty of an error that is called certain. Measured: see docs/stated-error.md.
+/// The largest relative uncertainty of an error that is called certain, with its parts weighted as below. Measured: see
+/// docs/stated-error.md.
 const MOST_UNCERTAIN: f64 = 0.10;
+
+/// What counts of the relative variance of E² that few terms bring, in the question whether it is certain. Where such terms were found,
+/// the error is more often too large than too small.
+const OF_TERMS: f64 = 0.7;
+
+/// The same of pools that few samples carry. Before light was found, they make it too small.
+const OF_POOLS: f64 = 2.0;
 
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
 const EVEN: f64 = 5.0 / 3.0;
@@ -56,6 +64,12 @@ const MOST_UNLIT: f64 = 0.01;
 
 /// If so many pixels have found light that mirrors and glass show, and that no light path brings, its error is known from them.
 const FEW_FOUND: f64 = 32.0;
+
+/// If so much of the squared error may be missing, it is in doubt.
+const MOST_MISSING: f64 = 1.0;
+
+/// The largest share of pixels in which such light may stay unknown.
+const MOST_HIDDEN: f64 = 0.003;
 
 /// The radiance of such light over that of the brightest light, or a little less: a matt surface scatters it.
 const MATT: f64 = 0.25;
@@ -248,7 +262,7 @@ impl Film {
             let of_floor = 4.0 / carriers(all.0, all.1) * (floors / sum).powi(2);
             uncertainty = 0.5 * (of_terms + of_pools + of_floor).sqrt();
             let surplus = (of_terms - EVEN / count).max(0.0);
-            by_rare_light = 0.5 * (surplus + of_pools + of_floor).sqrt();
+            by_rare_light = 0.5 * (OF_TERMS * surplus + OF_POOLS * of_pools + of_floor).sqrt();
         }
         let single = self.replicates().0 < 2;
         if single {
@@ -258,7 +272,7 @@ impl Film {
         let [hidden, missing] = self.hidden(&pixels, mean, count);
         let doubt = if unlit > MOST_UNLIT {
             Some(Doubt::Unlit(unlit))
-        } else if missing > 2.0 * MOST_UNCERTAIN * value * value {
+        } else if hidden > MOST_HIDDEN && missing > MOST_MISSING * value * value {
             Some(Doubt::Hidden(hidden))
         } else {
             (single || by_rare_light > MOST_UNCERTAIN).then_some(Doubt::Uncertain)

@@ -7,7 +7,7 @@ use super::literal::{float, vector};
 use crate::settings::{Integrator, Settings};
 use crate::stats::luminance;
 use crate::world::World;
-use crate::world::bulbs::{self, Bulb};
+use crate::world::bulbs::Bulb;
 use glam::DVec3;
 use std::fmt::Write as _;
 
@@ -19,15 +19,11 @@ const LEAST_WEIGHT: f64 = 1e-6;
 
 /// The bulbs that the kernel samples. Their light has been scattered by matt or glossy things, and then crossed one or two shells.
 /// [Whitted's integrator](Integrator::Whitted) gathers no such light.
-pub(super) fn sampled(world: &World, settings: &Settings) -> Vec<Bulb> {
+pub(super) fn sampled<'w>(world: &'w World, settings: &Settings) -> &'w [Bulb] {
     let wanted = settings.integrator != Integrator::Whitted
         && settings.light.indirect
         && last_depth(settings) > 2;
-    if wanted {
-        bulbs::bulbs(world)
-    } else {
-        Vec::new()
-    }
+    if wanted { &world.bulbs } else { &[] }
 }
 
 /// `bulb_of`, `choose_bulb` and `bulb_probability`.

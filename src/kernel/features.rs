@@ -174,7 +174,7 @@ impl Features {
         let scatters = materials.iter().any(|m| !m.is_specular());
         let light_sampling = last_depth > 1 && !world.lights.is_empty() && scatters;
         let bulbs = if light_sampling {
-            bulbs::sampled(world, settings)
+            bulbs::sampled(world, settings).to_vec()
         } else {
             Vec::new()
         };

@@ -38,7 +38,7 @@ pub(super) fn aims(world: &World, settings: &Settings) -> Option<Aims> {
     let mut used = (world.primitives.iter()).map(|p| world.materials[p.material].kind());
     let scatters = used.any(|kind| !kind.is_specular());
     if wanted && scatters && last_depth(settings) > 2 {
-        Aims::new(world, &bulbs::sampled(world, settings))
+        Aims::new(world, bulbs::sampled(world, settings))
     } else {
         None
     }

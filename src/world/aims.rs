@@ -286,9 +286,9 @@ mod tests {
     fn of_bulbs_light_paths_look_for_what_other_mirrors_get() {
         let share = |things: &str| {
             let world = world(things);
-            let bulbs = crate::world::bulbs::bulbs(&world);
+            let bulbs = &world.bulbs;
             assert_eq!(bulbs.len(), 1);
-            Aims::new(&world, &bulbs).expect("aims").share
+            Aims::new(&world, bulbs).expect("aims").share
         };
         let bulb = light("[0, 2, 0]") + &ball("[0, 2, 0]", 1.5);
         assert!(share(&bulb) <= 0.1, "{}", share(&bulb));

@@ -145,6 +145,8 @@ pub struct World {
     /// (n at the eye / n)² of every medium, if some light may lie in several media. A path that ends on a light in medium m
     /// sees the light's radiance times element m. `None` if every light lies in one medium.
     pub light_scales: Option<Vec<f64>>,
+    /// Lights in glass balls that can be sampled from outside.
+    pub(crate) bulbs: Vec<bulbs::Bulb>,
 }
 
 impl World {
@@ -231,7 +233,7 @@ impl World {
             dy: forward.cross(right) * pixel,
             medium,
         };
-        Self {
+        let mut world = Self {
             origin: scene_origin,
             unit,
             camera,
@@ -240,7 +242,10 @@ impl World {
             primitives,
             indices: media.indices(),
             light_scales: shines_in.is_none().then_some(scales),
-        }
+            bulbs: Vec::new(),
+        };
+        world.bulbs = bulbs::bulbs(&world);
+        world
     }
 
     /// How many lights and primitives there are.

@@ -120,8 +120,13 @@ fn evenly_lit_pictures_state_their_error_however_rare_the_light_is() {
             uncertainty > 0.5 * spread,
             "{found}: {uncertainty}, {spread}"
         );
-        // A spread of an eighth needs some sixteen samples.
-        assert_eq!(doubted, if found < 100.0 { 1.0 } else { 0.0 }, "{found}");
+        // A pool that some 215 samples carry is at the limit: 1 / √215, once more by √2, is about a tenth.
+        let doubts = match found {
+            ..100.0 => 1.0..=1.0,
+            ..300.0 => 0.0..=0.2,
+            _ => 0.0..=0.0,
+        };
+        assert!(doubts.contains(&doubted), "{found}: {doubted}");
     }
 }
 
@@ -249,12 +254,14 @@ fn light_that_mirrors_show_is_in_doubt_until_it_was_found() {
         }
         film.relative_error().doubt
     };
-    // E is 0.1 / 8. No sample of 100 x 64 has found light of 1/4 of 64, but 3 may. Then E would be larger by √(3 / 6400 x 16² / 64 x
-    // 100 / 1728), which is 1 / 96. With a lamp of 8 it is an eighth of that.
-    assert_eq!(doubt(64.0, 100, 0), Some(Doubt::Hidden(100.0 / PIXELS)));
-    assert_eq!(doubt(8.0, 100, 0), None);
-    assert_eq!(doubt(64.0, 0, 0), None, "nothing is hidden");
-    assert_eq!(doubt(64.0, 100, 40), None, "enough was found");
+    // E is 0.1 / 8. No sample of 100 x 64 has found light of 1/4 of 128, but 3 may. Their part in the error is √(3 / 6400 x 32² / 64 x
+    // 100 / 1728), which is 1 / 48. With a lamp of 64 it is half of that, and less than E.
+    assert_eq!(doubt(128.0, 100, 0), Some(Doubt::Hidden(100.0 / PIXELS)));
+    assert_eq!(doubt(64.0, 100, 0), None);
+    assert_eq!(doubt(128.0, 0, 0), None, "nothing is hidden");
+    assert_eq!(doubt(128.0, 100, 40), None, "enough was found");
+    assert_eq!(doubt(1e6, 6, 0), Some(Doubt::Hidden(6.0 / PIXELS)));
+    assert_eq!(doubt(1e6, 5, 0), None, "in hardly any of the picture");
 }
 
 #[test]

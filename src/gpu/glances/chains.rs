@@ -5,7 +5,6 @@
 
 use super::{FilmBox, Mark};
 use crate::film::coverage::Rect;
-use crate::world::bulbs::bulbs;
 use crate::world::trace::{Hit, Met, Ray, camera_ray};
 use crate::world::{Geometry, World};
 use glam::DVec3;
@@ -268,7 +267,7 @@ impl Image {
 fn images(world: &World, size: [u32; 2], last_vertex: u32) -> Vec<Image> {
     let camera = &world.camera;
     let mut images = Vec::new();
-    for bulb in bulbs(world) {
+    for bulb in &world.bulbs {
         if camera.medium != bulb.medium {
             continue;
         }

@@ -258,7 +258,7 @@ impl Bulb {
 }
 
 /// The bulbs of a world.
-pub(crate) fn bulbs(world: &World) -> Vec<Bulb> {
+pub(super) fn bulbs(world: &World) -> Vec<Bulb> {
     let may_be_one =
         |l: &&WorldLight| l.medium.is_some_and(|m| m != AIR) && l.emitted.max_element() > 0.0;
     let candidates = world.lights.iter().filter(may_be_one).count();

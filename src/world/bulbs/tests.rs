@@ -28,7 +28,7 @@ fn ball(center: [f64; 3], radius: f64, material: &str) -> String {
 
 /// How many shells the only light's bulb has, and whether reflected light is sampled; `None` if it is in no bulb.
 fn bulb(things: &str) -> Option<(u32, bool)> {
-    let found = bulbs(&world(things));
+    let found = world(things).bulbs;
     assert!(found.len() < 2);
     found.first().map(|b| (b.count, b.reflects))
 }
@@ -70,18 +70,18 @@ fn lights_alone_in_the_middle_of_balls_are_bulbs() {
         + &lamp
             .replace("[0.0, 0.0, 0.0]", "[0.0, 0.95, 0.0]")
             .replace("= 0.1", "= 0.01");
-    assert_eq!(bulbs(&world(&(lamp.clone() + &layer))), [], "in the glass");
+    assert_eq!(world(&(lamp.clone() + &layer)).bulbs, [], "in the glass");
     // Another light behind it blocks no straight ray, but reflected ones; one before it blocks both.
     let behind = lamp
         .replace("[0.0, 0.0, 0.0]", "[0.0, 0.2, 0.0]")
         .replace("[0.2, -1, 0.1]", "[-0.2, 1, -0.1]");
-    let two = bulbs(&world(&(lamp.clone() + &glass + &behind)));
+    let two = world(&(lamp.clone() + &glass + &behind)).bulbs;
     assert_eq!(
         two.iter().map(|b| b.reflects).collect::<Vec<_>>(),
         [false, false]
     );
     let before = behind.replace("[-0.2, 1, -0.1]", "[0.2, -1, 0.1]");
-    let one = bulbs(&world(&(lamp.clone() + &glass + &before)));
+    let one = world(&(lamp.clone() + &glass + &before)).bulbs;
     assert_eq!(one.len(), 1);
 }
 
@@ -95,7 +95,7 @@ fn rays_come_from_the_light() {
     let hollow = solid.clone() + &ball(o, 0.8, "bubble");
     for shells in [solid, dense, hollow] {
         let world = world(&(lamp.clone() + &shells));
-        let bulb = bulbs(&world).remove(0);
+        let bulb = world.bulbs[0].clone();
         let l = &world.lights[0];
         let mut glass = world.clone();
         glass.lights.clear();
