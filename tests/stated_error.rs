@@ -1,6 +1,6 @@
 //! The relative error that a picture states, its uncertainty and its doubts, against long references.
 //!
-//! The table of docs/stated-error.md, over all scenes (some twenty minutes on two cores):
+//! The table of docs/stated-error.md, over all scenes (an hour on two cores):
 //! `cargo test --release --test stated_error -- --ignored --nocapture`
 
 mod common;
@@ -190,7 +190,7 @@ fn print_row(name: &str, samples: u64, cell: &Cell) {
 }
 
 #[test]
-#[ignore = "twenty minutes"]
+#[ignore = "an hour"]
 fn the_table() {
     let mut scenes = folder("stated_error");
     scenes.extend(scene_files());
