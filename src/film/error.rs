@@ -44,14 +44,14 @@ const RADII: [u32; 5] = [1, 3, 7, 15, 31];
 
 /// The largest relative uncertainty of an error that is called certain, with its parts weighted as below. Measured: see
 /// docs/stated-error.md.
-const MOST_UNCERTAIN: f64 = 0.09;
+const MOST_UNCERTAIN: f64 = 0.1;
 
 /// What counts of the relative variance of E² that few terms bring, in the question whether it is certain. Where such terms were found,
 /// the error is more often too large than too small.
 const OF_TERMS: f64 = 0.5;
 
 /// The same of pools that few samples carry. Before light was found, they make it too small.
-const OF_POOLS: f64 = 3.0;
+const OF_POOLS: f64 = 2.5;
 
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
 const EVEN: f64 = 5.0 / 3.0;
