@@ -42,15 +42,13 @@ const BRIGHTER: f64 = 1.0;
 /// pool's.
 const RADII: [u32; 5] = [1, 3, 7, 15, 31];
 
-/// The largest relative uncertainty of an error that is called certain, with its parts weighted as below. Measured: see
-/// docs/stated-error.md.
+/// The largest relative uncertainty of an error that is called certain, with the weights below. Measured: see docs/stated-error.md.
 const MOST_UNCERTAIN: f64 = 0.1;
 
-/// What counts of the relative variance of E² that few terms bring, in the question whether it is certain. Where such terms were found,
-/// the error is more often too large than too small.
+/// Weight of the variance that few terms bring. Where such terms were found, the error is more often too large than too small.
 const OF_TERMS: f64 = 0.5;
 
-/// The same of pools that few samples carry. Before light was found, they make it too small.
+/// Weight of the variance of pools that few samples carry. Before their light is found, the error is too small.
 const OF_POOLS: f64 = 2.5;
 
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
@@ -65,10 +63,10 @@ const MOST_UNLIT: f64 = 0.01;
 /// If so many pixels have found light that mirrors and glass show, and that no light path brings, its error is known from them.
 const FEW_FOUND: f64 = 32.0;
 
-/// If so much of the squared error may be missing, it is in doubt.
+/// The largest squared error that missing light may bring, over the stated one, without a doubt.
 const MOST_MISSING: f64 = 1.0;
 
-/// The largest share of pixels in which such light may stay unknown.
+/// The largest share of the picture that may be waiting for such light without a doubt.
 const MOST_HIDDEN: f64 = 0.003;
 
 /// The radiance of such light over that of the brightest light, or a little less: a matt surface scatters it.
