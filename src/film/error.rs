@@ -20,9 +20,10 @@
 //! at most [`DARKER`] of these standard deviations, or brighter by at most [`BRIGHTER`]. Where it is known, pixels whose paths
 //! have all met nothing are left out.
 //!
-//! The **uncertainty** of the relative error E has three parts, which are relative variances of E². The terms c of pixels are
-//! independent, and as few as they are uneven: Σ c² / (Σ c)². The means of the pools have the relative variance 1 / carriers, and
-//! count twice; pixels that share a pool share its error. The same holds for Ȳ.
+//! The **uncertainty** of the relative error E follows from the relative variance of E². Light that a pixel has found makes its own term
+//! larger, and it makes those terms smaller whose Y it is part of: by its pool, or by Ȳ. If the pixel's term is the share a of their sum, and
+//! its light changes the others by the share b, where c samples carry it, its part is a² + 2ab / c + b² / c. For even light both nearly cancel:
+//! of n samples that have found light, the relative variance is 1 / n, and not the 1 / n + 4 / n of terms and pools apart.
 
 use super::{Film, REPLICATES, Reach, replicate_counts};
 use crate::stats::{luminance, percent, percent_to};
@@ -43,13 +44,13 @@ const BRIGHTER: f64 = 1.0;
 const RADII: [u32; 5] = [1, 3, 7, 15, 31];
 
 /// The largest relative uncertainty of an error that is called certain, with the weights below. Measured: see docs/stated-error.md.
-const MOST_UNCERTAIN: f64 = 0.1;
+const MOST_UNCERTAIN: f64 = 0.09;
 
 /// Weight of the variance that few terms bring. Where such terms were found, the error is more often too large than too small.
-const OF_TERMS: f64 = 0.5;
+const OF_TERMS: f64 = 0.3;
 
 /// Weight of the variance of pools that few samples carry. Before their light is found, the error is too small.
-const OF_POOLS: f64 = 2.5;
+const OF_POOLS: f64 = 3.5;
 
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
 const EVEN: f64 = 5.0 / 3.0;
@@ -216,7 +217,9 @@ fn carriers(sum: f64, squares: f64) -> f64 {
 struct Term {
     /// s² / (Y² + floor²).
     value: f64,
-    /// Relative variance of `value` by the pool's.
+    /// Relative variance of `value` by Y, where the pixel stands for itself.
+    own: f64,
+    /// -½ of the derivative of `value` by the light of its pool.
     pool: f64,
     /// Derivative of ln `value` by -ln floor², times `value`.
     floor: f64,
@@ -251,16 +254,10 @@ impl Film {
         let value = (sum / count).sqrt();
         let [mut uncertainty, mut by_rare_light] = [0.0; 2];
         if sum > 0.0 {
-            let all = pixels
-                .iter()
-                .fold((0.0, 0.0), |t, p| (t.0 + p.sum, t.1 + p.squares));
-            let floors: f64 = terms.iter().map(|t| t.floor).sum();
-            let of_terms = terms.iter().map(|t| t.value * t.value).sum::<f64>() / (sum * sum);
-            let of_pools = shared_pools(&terms, width, sum) / (sum * sum);
-            let of_floor = 4.0 / carriers(all.0, all.1) * (floors / sum).powi(2);
-            uncertainty = 0.5 * (of_terms + of_pools + of_floor).sqrt();
-            let surplus = (of_terms - EVEN / count).max(0.0);
-            by_rare_light = 0.5 * (OF_TERMS * surplus + OF_POOLS * of_pools + of_floor).sqrt();
+            let noise = picture.noise(&terms, sum);
+            uncertainty = 0.5 * (noise.terms + noise.pools + noise.both).max(0.0).sqrt();
+            let surplus = (noise.terms - EVEN / count).max(0.0);
+            by_rare_light = 0.5 * (OF_TERMS * surplus + OF_POOLS * noise.pools).sqrt();
         }
         let single = self.replicates().0 < 2;
         if single {
@@ -368,6 +365,40 @@ struct Square<'a> {
     reached: &'a [u8],
     width: u32,
     height: u32,
+    /// The light of all samples.
+    light: f64,
+}
+
+/// Relative variances of the sum of all terms, or a pixel's part in them.
+#[derive(Debug, Clone, Copy, Default)]
+struct Noise {
+    /// By the terms alone, which are independent.
+    terms: f64,
+    /// By the pixels' Y.
+    pools: f64,
+    /// Twice the covariance of the two.
+    both: f64,
+}
+
+impl std::iter::Sum for Noise {
+    fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
+        parts.fold(Self::default(), |a, b| Self {
+            terms: a.terms + b.terms,
+            pools: a.pools + b.pools,
+            both: a.both + b.both,
+        })
+    }
+}
+
+/// The pixels that say how bright a pixel is.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pool {
+    /// Their mean luminance.
+    mean: f64,
+    /// Sum of the luminances of their samples.
+    light: f64,
+    /// As in [`Term`].
+    radius: u32,
 }
 
 /// A rectangle of a film: columns and rows.
@@ -380,6 +411,7 @@ impl<'a> Square<'a> {
             reached,
             width,
             height: (pixels.len() / width as usize) as u32,
+            light: pixels.iter().map(|p| p.sum).sum(),
         }
     }
 
@@ -389,28 +421,107 @@ impl<'a> Square<'a> {
         if !(pixel.n > 0.0 && pixel.variance > 0.0) {
             return Term::default();
         }
-        let (y, carriers, radius) = self.pool(i, mean);
+        let pool = self.pool(i, mean);
+        let y = pool.mean;
         let scale = y * y + floor;
-        let value = match pixel.replicates.filter(|_| radius == 0) {
+        let value = match pixel.replicates.filter(|_| pool.radius == 0) {
             Some(replicates) => crossed(replicates, floor),
             None => pixel.variance / scale,
         };
+        let share = y * y / scale;
+        let alone = pool.radius == 0;
         Term {
             value,
-            pool: (y * y / scale).powi(2) * 4.0 / carriers.max(1.0),
+            own: if alone {
+                4.0 * share * share / pixel.carriers()
+            } else {
+                0.0
+            },
+            pool: if alone {
+                0.0
+            } else {
+                value * share / pool.light
+            },
             floor: value * floor / scale,
-            radius,
+            radius: pool.radius,
         }
     }
 
-    /// Mean luminance of a pixel's pool, how many samples carry it, and its radius.
-    fn pool(&self, i: usize, mean: f64) -> (f64, f64, u32) {
+    /// Relative variances of `sum`, the sum of the terms.
+    fn noise(&self, terms: &[Term], sum: f64) -> Noise {
+        let total = |f: fn(&Term) -> f64| terms.iter().map(f).sum::<f64>();
+        let of_picture = |t: &Term| if t.radius == u32::MAX { t.pool } else { 0.0 };
+        let everywhere = total(of_picture) + total(|t| t.floor) / self.light;
+        let in_pools = self.in_pools(terms);
+        let of_pixel = |k: usize| {
+            let (pixel, term) = (&self.pixels[k], &terms[k]);
+            let value = term.value / sum;
+            let by_light = -2.0 * pixel.sum * (in_pools[k] + everywhere) / sum;
+            let carriers = pixel.carriers().max(1.0);
+            Noise {
+                terms: value * value,
+                pools: value * value * term.own + by_light * by_light / carriers,
+                both: 2.0 * value * by_light / carriers,
+            }
+        };
+        let width = self.width as usize;
+        // Row by row, so that the sum does not depend on the number of threads.
+        let rows: Vec<Noise> = (0..self.height as usize)
+            .into_par_iter()
+            .map(|y| (y * width..(y + 1) * width).map(of_pixel).sum())
+            .collect();
+        rows.into_iter().sum()
+    }
+
+    /// For each pixel, the sum of [`Term::pool`] of the other pixels whose pools it is in.
+    fn in_pools(&self, terms: &[Term]) -> Vec<f64> {
+        /// Rows that a thread fills.
+        const BAND: usize = 16;
+        let (width, height) = (self.width as usize, self.height as usize);
+        let farthest = RADII[RADII.len() - 1] as usize;
+        let mut sums = vec![0.0; terms.len()];
+        let bands = sums.par_chunks_mut(BAND * width).enumerate();
+        bands.for_each(|(band, sums)| {
+            let first = band * BAND;
+            let end = first + sums.len() / width;
+            let near = first.saturating_sub(farthest)..height.min(end + farthest);
+            for i in near.start * width..near.end * width {
+                let term = &terms[i];
+                if term.pool == 0.0 || term.radius == u32::MAX {
+                    continue;
+                }
+                let [columns, rows] = window(i, term.radius, self.width, self.height);
+                for y in rows.start.max(first)..rows.end.min(end) {
+                    for x in columns.clone() {
+                        let k = y * width + x;
+                        if k != i && self.in_pool(i, k) {
+                            sums[k - first * width] += term.pool;
+                        }
+                    }
+                }
+            }
+        });
+        sums
+    }
+
+    /// Whether pixel number k may be as bright as number i, so that it is in the pool of i if it is near.
+    fn in_pool(&self, i: usize, k: usize) -> bool {
+        let other = &self.pixels[k];
+        other.n > 0.0 && self.reached.get(k) != Some(&0) && self.pixels[i].compatible(other)
+    }
+
+    /// A pixel's pool.
+    fn pool(&self, i: usize, mean: f64) -> Pool {
         let pixel = &self.pixels[i];
         let own = pixel.carriers();
         if own >= ENOUGH {
-            return (pixel.mean(), own, 0);
+            return Pool {
+                mean: pixel.mean(),
+                light: pixel.sum,
+                radius: 0,
+            };
         }
-        let mut best = (pixel.mean(), own);
+        let mut widest = Pool::default();
         for radius in RADII {
             let [columns, rows] = window(i, radius, self.width, self.height);
             let whole = columns.len() == self.width as usize && rows.len() == self.height as usize;
@@ -420,28 +531,41 @@ impl<'a> Square<'a> {
                     y * self.width as usize + columns.start..y * self.width as usize + columns.end
                 {
                     let p = &self.pixels[k];
-                    if k == i || p.n > 0.0 && self.reached.get(k) != Some(&0) && pixel.compatible(p)
-                    {
+                    if k == i || self.in_pool(i, k) {
                         n += p.n;
                         sum += p.sum;
                         squares += p.squares;
                     }
                 }
             }
-            best = (sum / n, carriers(sum, squares));
+            widest = Pool {
+                mean: sum / n,
+                light: sum,
+                radius,
+            };
+            let enough = carriers(sum, squares) >= ENOUGH;
             let others = n - pixel.n;
-            if best.1 >= ENOUGH && others > 0.0 {
+            if enough && others > 0.0 {
                 // The pixel's own light would hide its own noise.
-                return ((sum - pixel.sum) / others, best.1, radius);
+                let light = sum - pixel.sum;
+                return Pool {
+                    mean: light / others,
+                    light,
+                    radius,
+                };
             }
-            if best.1 >= ENOUGH || whole {
-                return (best.0, best.1, radius);
+            if enough || whole {
+                return widest;
             }
         }
-        if mean < best.0 {
-            return (mean, best.1, u32::MAX);
+        if mean < widest.mean {
+            return Pool {
+                mean,
+                light: self.light,
+                radius: u32::MAX,
+            };
         }
-        (best.0, best.1, RADII[RADII.len() - 1])
+        widest
     }
 }
 
@@ -477,35 +601,6 @@ fn window(i: usize, radius: u32, width: u32, height: u32) -> Window {
         at.saturating_sub(radius)..length.min(at.saturating_add(radius + 1))
     };
     [around(i % width, width), around(i / width, height)]
-}
-
-/// The variance of Σ value by the means of the pools: pixels that share a pool share its error.
-fn shared_pools(terms: &[Term], width: u32, sum: f64) -> f64 {
-    // Sums over all pixels above and to the left.
-    let columns = width as usize + 1;
-    let height = terms.len() / width as usize;
-    let mut sums = vec![0.0; columns * (height + 1)];
-    for (y, row) in terms.chunks(width as usize).enumerate() {
-        let mut so_far = 0.0;
-        for (x, term) in row.iter().enumerate() {
-            so_far += term.value;
-            sums[(y + 1) * columns + x + 1] = sums[y * columns + x + 1] + so_far;
-        }
-    }
-    let with_pools = terms.iter().enumerate().filter(|(_, t)| t.pool > 0.0);
-    let variance = with_pools.map(|(i, t)| {
-        let shared = match t.radius {
-            0 => t.value,
-            u32::MAX => sum,
-            radius => {
-                let [x, y] = window(i, radius, width, height as u32);
-                let at = |x: usize, y: usize| sums[y * columns + x];
-                at(x.end, y.end) - at(x.start, y.end) - at(x.end, y.start) + at(x.start, y.start)
-            }
-        };
-        t.value * t.pool * shared.max(t.value)
-    });
-    variance.sum()
 }
 
 #[cfg(test)]
