@@ -485,8 +485,8 @@ impl<'a> Square<'a> {
             let first = band * BAND;
             let end = first + sums.len() / width;
             let near = first.saturating_sub(farthest)..height.min(end + farthest);
-            for i in near.start * width..near.end * width {
-                let term = &terms[i];
+            let from = near.start * width;
+            for (i, term) in (from..).zip(&terms[from..near.end * width]) {
                 if term.pool == 0.0 || term.radius == u32::MAX {
                     continue;
                 }
