@@ -7,7 +7,7 @@
 //!
 //! **Y** must not be estimated from the pixel alone. Where light is rare, most pixels have not found any, and a pixel with one
 //! bright sample divides that sample's error by that sample. So Y is the mean of a *pool*: the smallest square around the pixel in
-//! which the light has come from at least [`ENOUGH`] samples. The number of samples that carry a sum is (Σ y)² / Σ y², after
+//! which the light has come from at least `ENOUGH` samples. The number of samples that carry a sum is (Σ y)² / Σ y², after
 //! Kish \[Kish1965\]: for n equal samples it is n. A pixel whose own light has come from so many samples stands for itself.
 //!
 //! s² and Y must not come from the same samples. Samples of light are skewed: where they have found too much, both are too large, and
@@ -17,7 +17,7 @@
 //! A pool holds only pixels that may be as bright as the pixel itself. Otherwise a lamp would hide the noise of the wall beside
 //! it, and a black background would exaggerate the noise of an edge. If the light of two pixels comes in samples of size a (which
 //! adds a/n to the mean), the difference of their means has the variance a (Y₁ + Y₂) / n. Other pixels of a pool are darker by
-//! at most [`DARKER`] of these standard deviations, or brighter by at most [`BRIGHTER`]. Where it is known, pixels whose paths
+//! at most `DARKER` of these standard deviations, or brighter by at most `BRIGHTER`. Where it is known, pixels whose paths
 //! have all met nothing are left out.
 //!
 //! The **uncertainty** of the relative error E follows from the relative variance of E². Light that a pixel has found makes its own term
@@ -25,23 +25,16 @@
 //! its light changes the others by the share b, where c samples carry it, its part is a² + 2ab / c + b² / c. For even light both nearly cancel:
 //! of n samples that have found light, the relative variance is 1 / n, and not the 1 / n + 4 / n of terms and pools apart.
 
+mod pools;
+#[cfg(test)]
+mod tests;
+
 use super::{Film, REPLICATES, Reach, replicate_counts};
 use crate::stats::{luminance, percent, percent_to};
+pub(super) use pools::Light;
+use pools::{Square, Term};
 use rayon::prelude::*;
 use std::fmt;
-
-/// Samples that must carry the light of a pool. Its mean then has a relative error of about 1/4.
-const ENOUGH: f64 = 16.0;
-
-/// Standard deviations by which another pixel of the pool may be darker than its own pixel.
-const DARKER: f64 = 2.0;
-
-/// The same, brighter. Less: beside a bright thing there are many brighter pixels, and they would hide noise.
-const BRIGHTER: f64 = 1.0;
-
-/// Radii of the squares that are tried, in pixels. Beyond the last one, the mean of the picture is taken if it is less than the
-/// pool's.
-const RADII: [u32; 5] = [1, 3, 7, 15, 31];
 
 /// The largest relative uncertainty of an error that is called certain, with the weights below. Measured: see docs/stated-error.md.
 const MOST_UNCERTAIN: f64 = 0.09;
@@ -166,65 +159,6 @@ impl fmt::Display for Doubt {
             Self::Uncertain => f.write_str("it rests on too few samples"),
         }
     }
-}
-
-/// What the estimate needs to know of a pixel.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Light {
-    /// Number of samples.
-    pub n: f64,
-    /// Sum of their luminances.
-    pub sum: f64,
-    /// Sum of the squares.
-    pub squares: f64,
-    /// Squared standard error of the mean.
-    variance: f64,
-    /// Means of the replicates, if all of them have equally many samples.
-    replicates: Option<[f64; REPLICATES]>,
-}
-
-impl Light {
-    fn mean(&self) -> f64 {
-        self.sum / self.n
-    }
-
-    /// How many samples carry the light.
-    pub fn carriers(&self) -> f64 {
-        carriers(self.sum, self.squares)
-    }
-
-    /// Whether `other` may be as bright as this pixel.
-    fn compatible(&self, other: &Self) -> bool {
-        let size = (self.squares + other.squares) / (self.sum + other.sum);
-        let (a, b) = (self.mean(), other.mean());
-        // Each mean has the variance size * mean / n.
-        let variance = size * (a / self.n + b / other.n);
-        let most = if b > a { BRIGHTER } else { DARKER };
-        (a - b).powi(2) <= most * most * variance
-    }
-}
-
-fn carriers(sum: f64, squares: f64) -> f64 {
-    if squares > 0.0 {
-        sum * sum / squares
-    } else {
-        0.0
-    }
-}
-
-/// A pixel's part in the error.
-#[derive(Debug, Clone, Copy, Default)]
-struct Term {
-    /// s² / (Y² + floor²).
-    value: f64,
-    /// Relative variance of `value` by Y, where the pixel stands for itself.
-    own: f64,
-    /// -½ of the derivative of `value` by the light of its pool.
-    pool: f64,
-    /// Derivative of ln `value` by -ln floor², times `value`.
-    floor: f64,
-    /// Radius of the pool; 0 for the pixel alone, `u32::MAX` for the picture.
-    radius: u32,
 }
 
 impl Film {
@@ -357,251 +291,3 @@ impl Film {
         (0..lit.len()).into_par_iter().filter(dark).count() as u64
     }
 }
-
-/// The pixels of a film, in rows of `width`.
-struct Square<'a> {
-    pixels: &'a [Light],
-    /// [`Film::reached`].
-    reached: &'a [u8],
-    width: u32,
-    height: u32,
-    /// The light of all samples.
-    light: f64,
-}
-
-/// Relative variances of the sum of all terms, or a pixel's part in them.
-#[derive(Debug, Clone, Copy, Default)]
-struct Noise {
-    /// By the terms alone, which are independent.
-    terms: f64,
-    /// By the pixels' Y.
-    pools: f64,
-    /// Twice the covariance of the two.
-    both: f64,
-}
-
-impl std::iter::Sum for Noise {
-    fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
-        parts.fold(Self::default(), |a, b| Self {
-            terms: a.terms + b.terms,
-            pools: a.pools + b.pools,
-            both: a.both + b.both,
-        })
-    }
-}
-
-/// The pixels that say how bright a pixel is.
-#[derive(Debug, Clone, Copy, Default)]
-struct Pool {
-    /// Their mean luminance.
-    mean: f64,
-    /// Sum of the luminances of their samples.
-    light: f64,
-    /// As in [`Term`].
-    radius: u32,
-}
-
-/// A rectangle of a film: columns and rows.
-type Window = [std::ops::Range<usize>; 2];
-
-impl<'a> Square<'a> {
-    fn new(pixels: &'a [Light], reached: &'a [u8], width: u32) -> Self {
-        Self {
-            pixels,
-            reached,
-            width,
-            height: (pixels.len() / width as usize) as u32,
-            light: pixels.iter().map(|p| p.sum).sum(),
-        }
-    }
-
-    /// Pixel number i's part in the error. `mean` and `floor` are Ȳ and (0.1 Ȳ)².
-    fn term(&self, i: usize, mean: f64, floor: f64) -> Term {
-        let pixel = &self.pixels[i];
-        if !(pixel.n > 0.0 && pixel.variance > 0.0) {
-            return Term::default();
-        }
-        let pool = self.pool(i, mean);
-        let y = pool.mean;
-        let scale = y * y + floor;
-        let value = match pixel.replicates.filter(|_| pool.radius == 0) {
-            Some(replicates) => crossed(replicates, floor),
-            None => pixel.variance / scale,
-        };
-        let share = y * y / scale;
-        let alone = pool.radius == 0;
-        Term {
-            value,
-            own: if alone {
-                4.0 * share * share / pixel.carriers()
-            } else {
-                0.0
-            },
-            pool: if alone {
-                0.0
-            } else {
-                value * share / pool.light
-            },
-            floor: value * floor / scale,
-            radius: pool.radius,
-        }
-    }
-
-    /// Relative variances of `sum`, the sum of the terms.
-    fn noise(&self, terms: &[Term], sum: f64) -> Noise {
-        let total = |f: fn(&Term) -> f64| terms.iter().map(f).sum::<f64>();
-        let of_picture = |t: &Term| if t.radius == u32::MAX { t.pool } else { 0.0 };
-        let everywhere = total(of_picture) + total(|t| t.floor) / self.light;
-        let in_pools = self.in_pools(terms);
-        let of_pixel = |k: usize| {
-            let (pixel, term) = (&self.pixels[k], &terms[k]);
-            let value = term.value / sum;
-            let by_light = -2.0 * pixel.sum * (in_pools[k] + everywhere) / sum;
-            let carriers = pixel.carriers().max(1.0);
-            Noise {
-                terms: value * value,
-                pools: value * value * term.own + by_light * by_light / carriers,
-                both: 2.0 * value * by_light / carriers,
-            }
-        };
-        let width = self.width as usize;
-        // Row by row, so that the sum does not depend on the number of threads.
-        let rows: Vec<Noise> = (0..self.height as usize)
-            .into_par_iter()
-            .map(|y| (y * width..(y + 1) * width).map(of_pixel).sum())
-            .collect();
-        rows.into_iter().sum()
-    }
-
-    /// For each pixel, the sum of [`Term::pool`] of the other pixels whose pools it is in.
-    fn in_pools(&self, terms: &[Term]) -> Vec<f64> {
-        /// Rows that a thread fills.
-        const BAND: usize = 16;
-        let (width, height) = (self.width as usize, self.height as usize);
-        let farthest = RADII[RADII.len() - 1] as usize;
-        let mut sums = vec![0.0; terms.len()];
-        let bands = sums.par_chunks_mut(BAND * width).enumerate();
-        bands.for_each(|(band, sums)| {
-            let first = band * BAND;
-            let end = first + sums.len() / width;
-            let near = first.saturating_sub(farthest)..height.min(end + farthest);
-            let from = near.start * width;
-            for (i, term) in (from..).zip(&terms[from..near.end * width]) {
-                if term.pool == 0.0 || term.radius == u32::MAX {
-                    continue;
-                }
-                let [columns, rows] = window(i, term.radius, self.width, self.height);
-                for y in rows.start.max(first)..rows.end.min(end) {
-                    for x in columns.clone() {
-                        let k = y * width + x;
-                        if k != i && self.in_pool(i, k) {
-                            sums[k - first * width] += term.pool;
-                        }
-                    }
-                }
-            }
-        });
-        sums
-    }
-
-    /// Whether pixel number k may be as bright as number i, so that it is in the pool of i if it is near.
-    fn in_pool(&self, i: usize, k: usize) -> bool {
-        let other = &self.pixels[k];
-        other.n > 0.0 && self.reached.get(k) != Some(&0) && self.pixels[i].compatible(other)
-    }
-
-    /// A pixel's pool.
-    fn pool(&self, i: usize, mean: f64) -> Pool {
-        let pixel = &self.pixels[i];
-        let own = pixel.carriers();
-        if own >= ENOUGH {
-            return Pool {
-                mean: pixel.mean(),
-                light: pixel.sum,
-                radius: 0,
-            };
-        }
-        let mut widest = Pool::default();
-        for radius in RADII {
-            let [columns, rows] = window(i, radius, self.width, self.height);
-            let whole = columns.len() == self.width as usize && rows.len() == self.height as usize;
-            let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
-            for y in rows {
-                for k in
-                    y * self.width as usize + columns.start..y * self.width as usize + columns.end
-                {
-                    let p = &self.pixels[k];
-                    if k == i || self.in_pool(i, k) {
-                        n += p.n;
-                        sum += p.sum;
-                        squares += p.squares;
-                    }
-                }
-            }
-            widest = Pool {
-                mean: sum / n,
-                light: sum,
-                radius,
-            };
-            let enough = carriers(sum, squares) >= ENOUGH;
-            let others = n - pixel.n;
-            if enough && others > 0.0 {
-                // The pixel's own light would hide its own noise.
-                let light = sum - pixel.sum;
-                return Pool {
-                    mean: light / others,
-                    light,
-                    radius,
-                };
-            }
-            if enough || whole {
-                return widest;
-            }
-        }
-        if mean < widest.mean {
-            return Pool {
-                mean,
-                light: self.light,
-                radius: u32::MAX,
-            };
-        }
-        widest
-    }
-}
-
-/// s² / (Y² + floor) of a pixel alone. Where its samples are skewed, a mean that is too bright comes with a variance that is too large,
-/// and their quotient is too small. So each pair of replicates gives a variance, and the other two give the mean, which is
-/// independent of it. The last factor takes off what the noise of that mean adds (to second order).
-fn crossed(replicates: [f64; REPLICATES], floor: f64) -> f64 {
-    /// The expansion is of no use where the noise is as large as the mean.
-    const MOST: f64 = 0.5;
-    let mut sum = 0.0;
-    for (a, b, c, d) in [
-        (0, 1, 2, 3),
-        (0, 2, 1, 3),
-        (0, 3, 1, 2),
-        (1, 2, 0, 3),
-        (1, 3, 0, 2),
-        (2, 3, 0, 1),
-    ] {
-        let [a, b, c, d] = [a, b, c, d].map(|r: usize| replicates[r]);
-        let y = 0.5 * (c + d);
-        let noise = 0.25 * (c - d).powi(2);
-        let scale = y * y + floor;
-        let curvature = (3.0 * y * y - floor) / (scale * scale);
-        sum += 0.125 * (a - b).powi(2) / scale * (1.0 - (curvature * noise).clamp(-MOST, MOST));
-    }
-    sum / 6.0
-}
-
-/// The columns and rows within `radius` of pixel number i.
-fn window(i: usize, radius: u32, width: u32, height: u32) -> Window {
-    let [width, height, radius] = [width, height, radius].map(|n| n as usize);
-    let around = |at: usize, length: usize| {
-        at.saturating_sub(radius)..length.min(at.saturating_add(radius + 1))
-    };
-    [around(i % width, width), around(i / width, height)]
-}
-
-#[cfg(test)]
-mod tests;
