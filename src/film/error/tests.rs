@@ -116,8 +116,10 @@ fn evenly_lit_pictures_state_their_error_however_rare_the_light_is() {
         // less than 1.
         let bounds = if found < 10.0 { 0.7..1.35 } else { 0.9..1.15 };
         assert!(bounds.contains(&ratio), "{found}: {ratio}");
+        // If what terms and pools cancel of each other were not counted, it would be 1.8 to 3.4 up to 256 samples.
+        let most = if found < 300.0 { 1.7 } else { 2.0 };
         assert!(
-            (0.85..2.0).contains(&(uncertainty / spread)),
+            (0.85..most).contains(&(uncertainty / spread)),
             "{found}: {uncertainty}, {spread}"
         );
         // A pool that some 440 samples carry is at the limit: half of √(3.5 x 4 / 440) is about 0.09.
