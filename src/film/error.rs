@@ -6,13 +6,15 @@
 //! **s²** is estimated without bias, from the pixel's own replicates.
 //!
 //! **Y** must not be estimated from the pixel alone. Where light is rare, most pixels have not found any, and a pixel with one
-//! bright sample divides that sample's error by that sample. So Y is the mean of a *pool*: the smallest square around the pixel in
+//! bright sample divides that sample's error by that sample. So a *pool* is asked: the smallest square around the pixel in
 //! which the light has come from at least `ENOUGH` samples. The number of samples that carry a sum is (Σ y)² / Σ y², after
-//! Kish \[Kish1965\]: for n equal samples it is n. A pixel whose own light has come from so many samples stands for itself.
+//! Kish \[Kish1965\]: for n equal samples it is n. What the pixel's own samples say is set against it: the pool's mean counts as much as
+//! `BELIEF` samples that have found light. So a pixel at an edge is not taken for as bright as the things beside it. A pixel whose own light has
+//! come from `ALONE` samples stands for itself.
 //!
 //! s² and Y must not come from the same samples. Samples of light are skewed: where they have found too much, both are too large, and
-//! the quotient is too small. So the pool of a pixel has a mean without the pixel's own light, and a pixel that stands for itself has
-//! s² from two of its replicates, and Y from the other two.
+//! the quotient is too small. So the pool of a pixel has a mean without the pixel's own light, s² comes from two of its replicates, and
+//! its own part in Y from the other two.
 //!
 //! A pool holds only pixels that may be as bright as the pixel itself. Otherwise a lamp would hide the noise of the wall beside
 //! it, and a black background would exaggerate the noise of an edge. If the light of two pixels comes in samples of size a (which
@@ -36,14 +38,12 @@ use pools::{Square, Term};
 use rayon::prelude::*;
 use std::fmt;
 
-/// The largest relative uncertainty of an error that is called certain, with the weights below. Measured: see docs/stated-error.md.
-const MOST_UNCERTAIN: f64 = 0.09;
-
-/// Weight of the variance that few terms bring. Where such terms were found, the error is more often too large than too small.
-const OF_TERMS: f64 = 0.3;
+/// The largest relative uncertainty of an error that is called certain, with the variance of pools counted [`OF_POOLS`] times. Measured: see
+/// docs/stated-error.md.
+const MOST_UNCERTAIN: f64 = 0.11;
 
 /// Weight of the variance of pools that few samples carry. Before their light is found, the error is too small.
-const OF_POOLS: f64 = 3.5;
+const OF_POOLS: f64 = 3.0;
 
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
 const EVEN: f64 = 5.0 / 3.0;
@@ -191,7 +191,8 @@ impl Film {
             let noise = picture.noise(&terms, sum);
             uncertainty = 0.5 * (noise.terms + noise.pools + noise.both).max(0.0).sqrt();
             let surplus = (noise.terms - EVEN / count).max(0.0);
-            by_rare_light = 0.5 * (OF_TERMS * surplus + OF_POOLS * noise.pools).sqrt();
+            let weighted = surplus + OF_POOLS * noise.pools + noise.both;
+            by_rare_light = 0.5 * weighted.max(0.0).sqrt();
         }
         let single = self.replicates().0 < 2;
         if single {
