@@ -87,8 +87,8 @@ struct Cell {
     own: f64,
     /// Root mean square over the seeds of the errors that the pictures have.
     actual: f64,
-    /// What each states, its uncertainty, and whether it is in doubt.
-    stated: Vec<(f64, f64, bool)>,
+    /// What each states, its uncertainty, whether it is in doubt, and the error that it has.
+    stated: Vec<(f64, f64, bool, f64)>,
     /// Pixels of all seeds that are not black, and how many of them are off by more than three of their stated errors.
     pixels: f64,
     beyond_3: f64,
@@ -127,12 +127,14 @@ fn cells(path: &Path) -> Vec<Cell> {
                 cell.squares.1 += error * error;
             }
             cell.own += truth.mean(|i, _| picture[i].1).powi(2) / f64::from(SEEDS);
-            cell.actual += truth.of(&picture).powi(2) / f64::from(SEEDS);
+            let actual = truth.of(&picture);
+            cell.actual += actual.powi(2) / f64::from(SEEDS);
             let error = film.relative_error();
             cell.stated.push((
                 error.value.unwrap_or(0.0),
                 error.uncertainty.unwrap_or(0.0),
                 error.doubt.is_some(),
+                actual,
             ));
         }
     }
@@ -143,31 +145,72 @@ fn cells(path: &Path) -> Vec<Cell> {
     cells
 }
 
+/// How many pictures there are of a kind, and how many of them are in doubt.
+#[derive(Default, Clone, Copy)]
+struct Count {
+    all: usize,
+    doubted: usize,
+}
+
+impl Count {
+    fn add(&mut self, belongs: bool, doubted: bool) {
+        self.all += usize::from(belongs);
+        self.doubted += usize::from(belongs && doubted);
+    }
+
+    /// The share that is in doubt.
+    fn share(self) -> String {
+        percent(self.doubted as f64 / self.all.max(1) as f64)
+    }
+
+    fn undoubted(self) -> usize {
+        self.all - self.doubted
+    }
+}
+
 /// How the statements of many pictures turned out.
 #[derive(Default)]
 struct Score {
-    /// Pictures whose expected error exceeds 1.2 times the stated one, and how many of them are in doubt.
-    too_small: [usize; 2],
-    /// Pictures whose stated error is right to a tenth, and how many of them are in doubt.
-    right: [usize; 2],
-    all: usize,
+    pictures: Count,
+    /// The expected error exceeds 1.2 times the stated one.
+    too_small: Count,
+    /// The stated error is right to a tenth.
+    right: Count,
+    /// The same, and it is right to a tenth about the error that the picture itself has.
+    right_itself: Count,
 }
 
 impl Score {
     fn add(&mut self, cell: &Cell) {
-        for &(stated, _, doubted) in &cell.stated {
-            self.all += 1;
+        for &(stated, _, doubted, actual) in &cell.stated {
             let ratio = cell.expected.max(cell.own) / stated;
-            let count = |of: &mut [usize; 2]| {
-                of[0] += 1;
-                of[1] += usize::from(doubted);
-            };
-            if ratio.is_nan() || ratio > 1.2 {
-                count(&mut self.too_small);
-            } else if (ratio - 1.0).abs() <= 0.1 {
-                count(&mut self.right);
-            }
+            let is_right = |ratio: f64| (ratio - 1.0).abs() <= 0.1;
+            self.pictures.add(true, doubted);
+            self.too_small.add(ratio.is_nan() || ratio > 1.2, doubted);
+            self.right.add(is_right(ratio), doubted);
+            let itself = is_right(ratio) && is_right(actual / stated);
+            self.right_itself.add(itself, doubted);
         }
+    }
+
+    fn print(&self, scenes: usize) {
+        let undoubted = self.pictures.undoubted();
+        let share = |of: Count| percent(of.undoubted() as f64 / undoubted.max(1) as f64);
+        println!(
+            "{scenes} scenes, {} pictures. The error is above 1.2 times the stated one in {}; {} of these are in doubt. The stated \
+             error is right to a tenth in {}; {} of these are in doubt. In {} of these it is right about the error that the picture \
+             itself has, too; {} of these are in doubt. {undoubted} pictures are in no doubt: {} of these are right to a tenth, and in \
+             {} the error is above 1.2 times the stated one.",
+            self.pictures.all,
+            self.too_small.all,
+            self.too_small.share(),
+            self.right.all,
+            self.right.share(),
+            self.right_itself.all,
+            self.right_itself.share(),
+            share(self.right),
+            share(self.too_small),
+        );
     }
 }
 
@@ -175,7 +218,7 @@ fn print_row(name: &str, samples: u64, cell: &Cell) {
     let mut stated = cell.stated.clone();
     stated.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (least, most) = (stated[0].0, stated[stated.len() - 1].0);
-    let (_, uncertainty, _) = stated[stated.len() / 2];
+    let (_, uncertainty, ..) = stated[stated.len() / 2];
     let doubted = stated.iter().filter(|s| s.2).count();
     println!(
         "| {name} | {samples} | {} | {} | {} to {} | {} | {doubted} | {:.2} | {} |",
@@ -208,17 +251,7 @@ fn the_table() {
             score.add(&cell);
         }
     }
-    let share = |of: [usize; 2]| percent(of[1] as f64 / of[0].max(1) as f64);
-    println!(
-        "{} scenes, {} pictures. The error is above 1.2 times the stated one in {}; {} of these are in doubt. The stated error \
-         is right to a tenth in {}; {} of these are in doubt.",
-        scenes.len(),
-        score.all,
-        score.too_small[0],
-        share(score.too_small),
-        score.right[0],
-        share(score.right),
-    );
+    score.print(scenes.len());
 }
 
 fn named(name: &str) -> Vec<Cell> {
