@@ -38,12 +38,14 @@ use pools::{Square, Term};
 use rayon::prelude::*;
 use std::fmt;
 
-/// The largest relative uncertainty of an error that is called certain, with the variance of pools counted [`OF_POOLS`] times. Measured: see
-/// docs/stated-error.md.
-const MOST_UNCERTAIN: f64 = 0.11;
+/// The largest relative uncertainty of an error that is called certain, with the weights below. Measured: see docs/stated-error.md.
+const MOST_UNCERTAIN: f64 = 0.091;
+
+/// Weight of the variance that few terms bring. Where such terms were found, the error is more often too large than too small.
+const OF_TERMS: f64 = 0.5;
 
 /// Weight of the variance of pools that few samples carry. Before their light is found, the error is too small.
-const OF_POOLS: f64 = 3.0;
+const OF_POOLS: f64 = 2.5;
 
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
 const EVEN: f64 = 5.0 / 3.0;
@@ -191,7 +193,7 @@ impl Film {
             let noise = picture.noise(&terms, sum);
             uncertainty = 0.5 * (noise.terms + noise.pools + noise.both).max(0.0).sqrt();
             let surplus = (noise.terms - EVEN / count).max(0.0);
-            let weighted = surplus + OF_POOLS * noise.pools + noise.both;
+            let weighted = OF_TERMS * surplus + OF_POOLS * noise.pools + noise.both;
             by_rare_light = 0.5 * weighted.max(0.0).sqrt();
         }
         let single = self.replicates().0 < 2;

@@ -122,7 +122,7 @@ fn evenly_lit_pictures_state_their_error_however_rare_the_light_is() {
             (0.85..most).contains(&(uncertainty / spread)),
             "{found}: {uncertainty}, {spread}"
         );
-        // Some 190 samples are at the limit: half of √((1 + 2 x 4) / 190) is about 0.11.
+        // Some 200 samples are at the limit: half of √((0.5 + 2.5 x 4 - 4) / 200) is about 0.09.
         let expected = match found {
             ..100.0 => Some(1.0),
             1000.0.. => Some(0.0),
