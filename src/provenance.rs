@@ -109,14 +109,16 @@ impl Provenance {
         self.seconds += seconds;
     }
 
-    /// Takes samples, replicates and relative error from the film as it now stands.
-    pub fn describe(&mut self, film: &Film) {
+    /// Takes samples, replicates and relative error from the film as it now stands. Returns that error, which takes a while to compute
+    /// for a large picture.
+    pub fn describe(&mut self, film: &Film) -> RelativeError {
         self.samples = film.coverage.mean();
         self.replicates = film.replicates().0;
         let error = self.error(film);
         self.relative_error = error.value;
         self.relative_error_uncertainty = error.uncertainty;
         self.relative_error_doubt = error.doubt.map(|d| d.to_string());
+        error
     }
 
     /// The relative error of its film: zero if the picture is black, and is so by construction.

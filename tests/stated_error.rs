@@ -1,6 +1,7 @@
-//! The relative error that a picture states, its uncertainty and its doubts, against long references.
+//! The relative error that a picture states, its uncertainty and its doubts, against what independent pictures say: the seven others
+//! with most samples, and a reference of fewer pixels where these have found too little.
 //!
-//! The table of docs/stated-error.md, over all scenes (an hour on two cores):
+//! The table of docs/stated-error.md, over all scenes (two to three hours on two cores):
 //! `cargo test --release --test stated_error -- --ignored --nocapture`
 
 mod common;
@@ -8,15 +9,22 @@ mod common;
 use common::{add, film, gpu, read, scene_files, settings};
 use etendue::film::Film;
 use etendue::film::coverage::Rect;
+use etendue::film::error::RelativeError;
 use etendue::output::pixels::Pixels;
 use etendue::stats::{luminance, percent};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-const SIZE: [u32; 2] = [64, 48];
+/// Of the table: half of what the scenes give, in both directions.
+const SIZE: [u32; 2] = [256, 192];
+/// Formulas and volumes, which would take an hour at that size: they are as small as references.
+const SLOW: [&str; 4] = ["barth", "density", "gyroid", "peptide"];
+/// Of references, and of pictures of single scenes.
+const SMALL: [u32; 2] = [64, 48];
 const SAMPLES: [u64; 4] = [16, 64, 256, 1024];
 const SEEDS: u32 = 8;
-/// Samples of a reference, and its seed.
-const REFERENCE: (u64, u32) = (1 << 16, 77);
+/// A pixel's light is known once its square is so many times its squared standard error.
+const KNOWN: f64 = 64.0;
 
 /// Scene files of a folder under `tests/`, by name.
 fn folder(name: &str) -> Vec<PathBuf> {
@@ -32,57 +40,135 @@ fn folder(name: &str) -> Vec<PathBuf> {
     scenes
 }
 
-/// Luminance of every pixel and its squared standard error.
-fn pixels(film: &Film) -> Vec<(f64, f64)> {
-    let mut out = vec![(0.0, 0.0); film.sums().len()];
-    film.for_each(|x, y, e| out[film.index(x, y)] = (luminance(e.mean), e.error[3].powi(2)));
-    out
-}
-
-/// What a reference says of pictures with fewer samples.
-struct Truth {
+/// A picture, and what it states.
+struct Picture {
+    /// Luminance of every pixel and its squared standard error.
     pixels: Vec<(f64, f64)>,
-    floor: f64,
+    /// The error of every pixel's luminance that its file states.
+    errors: Vec<f64>,
+    relative_error: RelativeError,
 }
 
-impl Truth {
-    fn new(reference: &Film) -> Self {
-        let pixels = pixels(reference);
-        let mean = pixels.iter().map(|p| p.0).sum::<f64>() / pixels.len() as f64;
+impl Picture {
+    fn new(film: &Film) -> Self {
+        let mut pixels = vec![(0.0, 0.0); film.sums().len()];
+        film.for_each(|x, y, e| {
+            pixels[film.index(x, y)] = (luminance(e.mean), e.error[3].powi(2));
+        });
+        let stated = Pixels::new(film);
+        let mut errors = vec![0.0; pixels.len()];
+        film.for_each(|x, y, _| {
+            errors[film.index(x, y)] = stated.at(x, y).map_or(0.0, |e| e.error[3]);
+        });
         Self {
             pixels,
-            floor: (0.1 * mean).powi(2),
+            errors,
+            relative_error: film.relative_error(),
+        }
+    }
+}
+
+/// Of each seed the pictures with [`SAMPLES`] samples.
+fn render(path: &Path, size: [u32; 2]) -> Vec<Vec<Picture>> {
+    let scene = read(path);
+    let settings = settings(&scene, size, 1);
+    let mut engine = gpu(&scene, &settings, None);
+    let mut seed = |seed| {
+        engine.reseed(seed);
+        let mut film = Film::new(size, Rect::whole(size), settings.strata);
+        let mut at = 0;
+        let picture = |&n: &u64| {
+            add(&mut engine, &mut film, at..n);
+            at = n;
+            Picture::new(&film)
+        };
+        SAMPLES.iter().map(picture).collect()
+    };
+    (1..=SEEDS).map(&mut seed).collect()
+}
+
+/// The light of a scene in fewer pixels, from many samples.
+struct Reference {
+    light: Vec<f64>,
+    width: usize,
+}
+
+impl Reference {
+    /// Its seed is none of the pictures'.
+    fn new(path: &Path, samples: u64) -> Self {
+        let scene = read(path);
+        let settings = settings(&scene, SMALL, 77);
+        let film = film(&mut gpu(&scene, &settings, None), &settings, samples);
+        let mut light = vec![0.0; film.sums().len()];
+        film.for_each(|x, y, e| light[film.index(x, y)] = luminance(e.mean));
+        Self {
+            light,
+            width: SMALL[0] as usize,
         }
     }
 
-    /// √ mean over the pixels of `term` over Y² + floor.
-    fn mean(&self, term: impl Fn(usize, (f64, f64)) -> f64) -> f64 {
-        let terms = self
-            .pixels
-            .iter()
-            .enumerate()
-            .map(|(i, &p)| term(i, p) / (p.0 * p.0 + self.floor));
-        (terms.sum::<f64>() / self.pixels.len() as f64)
-            .max(0.0)
-            .sqrt()
+    /// Around pixel `i` of a picture of that width.
+    fn at(&self, i: usize, width: usize) -> f64 {
+        let pixels = width / self.width;
+        let [column, row] = [i % width, i / width].map(|k| k / pixels);
+        self.light[row * self.width + column]
+    }
+}
+
+/// What is known of a scene without one picture.
+struct Truth {
+    /// Of the other pictures: luminance of every pixel and its squared standard error.
+    pixels: Vec<(f64, f64)>,
+    /// 1 / (Y² + (0.1 Ȳ)²) for every pixel.
+    weights: Vec<f64>,
+}
+
+/// The mean of pictures of a scene: luminance of every pixel and its squared standard error.
+fn mean(pictures: &[&Picture]) -> Vec<(f64, f64)> {
+    let count = pictures.len() as f64;
+    let mean = |i: usize| {
+        let of = pictures.iter().map(|p| p.pixels[i]);
+        let (y, v) = of.fold((0.0, 0.0), |t, p| (t.0 + p.0, t.1 + p.1));
+        (y / count, v / (count * count))
+    };
+    (0..pictures[0].pixels.len()).map(mean).collect()
+}
+
+impl Truth {
+    /// `others` and `all` are [`mean`]s, without the picture and with it.
+    fn new(others: Vec<(f64, f64)>, all: &[(f64, f64)], reference: &Reference) -> Self {
+        let width = reference.width * (all.len() / reference.light.len()).isqrt();
+        let mean = others.iter().map(|p| p.0).sum::<f64>() / others.len() as f64;
+        let floor = (0.1 * mean).powi(2);
+        // Where the pictures do not know a pixel's light well enough, the quotient needs the reference's.
+        let is_known = |i: usize| all[i].1 * KNOWN <= all[i].0 * all[i].0;
+        let weight = |(i, p): (usize, &(f64, f64))| {
+            let light = if is_known(i) {
+                p.0
+            } else {
+                reference.at(i, width)
+            };
+            1.0 / (light * light + floor)
+        };
+        Self {
+            weights: others.iter().enumerate().map(weight).collect(),
+            pixels: others,
+        }
     }
 
-    /// The relative error that pictures with so many samples have on average (root mean square).
-    fn expected(&self, samples: u64) -> f64 {
-        self.mean(|_, (_, v)| v * REFERENCE.0 as f64 / samples as f64)
-    }
-
-    /// The error of one picture, less the reference's.
-    fn of(&self, picture: &[(f64, f64)]) -> f64 {
-        self.mean(|i, (y, v)| (picture[i].0 - y).powi(2) - v)
+    /// Mean over the pixels of `term` / (Y² + floor).
+    fn mean(&self, term: impl Fn(usize) -> f64) -> f64 {
+        let terms = self.weights.iter().enumerate().map(|(i, w)| term(i) * w);
+        terms.sum::<f64>() / self.pixels.len() as f64
     }
 }
 
 /// What pictures of a scene with so many samples state.
 #[derive(Default)]
 struct Cell {
+    /// What the pictures with most samples say of these: root mean square.
     expected: f64,
-    /// The same from the samples of these pictures, with the reference's light. Few samples are noisier than 1/√n of many says: a
+    /// The same from the samples of these pictures themselves. Few samples are noisier than 1/√n of many says: a
     /// pixel's first ones are not spread as evenly.
     own: f64,
     /// Root mean square over the seeds of the errors that the pictures have.
@@ -96,51 +182,50 @@ struct Cell {
     squares: (f64, f64),
 }
 
-fn cells(path: &Path) -> Vec<Cell> {
-    let scene = read(path);
-    let settings = settings(&scene, SIZE, REFERENCE.1);
-    let mut engine = gpu(&scene, &settings, None);
-    let truth = Truth::new(&film(&mut engine, &settings, REFERENCE.0));
-    let mut cells: Vec<Cell> = SAMPLES
-        .iter()
-        .map(|&n| Cell {
-            expected: truth.expected(n),
-            ..Cell::default()
-        })
-        .collect();
-    for seed in 1..=SEEDS {
-        engine.reseed(seed);
-        let mut film = Film::new(SIZE, Rect::whole(SIZE), settings.strata);
-        let mut at = 0;
-        for (&n, cell) in SAMPLES.iter().zip(&mut cells) {
-            add(&mut engine, &mut film, at..n);
-            at = n;
-            let picture = pixels(&film);
-            let stated = Pixels::new(&film);
+fn cells(path: &Path, size: [u32; 2], reference: u64) -> Vec<Cell> {
+    let reference = Reference::new(path, reference);
+    let pictures = render(path, size);
+    let most = SAMPLES.len() - 1;
+    let longest: Vec<&Picture> = pictures.iter().map(|p| &p[most]).collect();
+    let all = mean(&longest);
+    let mut cells: Vec<Cell> = SAMPLES.iter().map(|_| Cell::default()).collect();
+    for (seed, of_seed) in pictures.iter().enumerate() {
+        let mut others = longest.clone();
+        others.remove(seed);
+        let truth = Truth::new(mean(&others), &all, &reference);
+        let of_most = truth.mean(|i| of_seed[most].pixels[i].1);
+        for ((&n, cell), picture) in SAMPLES.iter().zip(&mut cells).zip(of_seed) {
             for (i, &(y, v)) in truth.pixels.iter().enumerate().filter(|(_, p)| p.0 > 0.0) {
-                let [column, row] = [i as u32 % SIZE[0], i as u32 / SIZE[0]];
-                let error = stated.at(column, row).map_or(0.0, |e| e.error[3]);
-                let difference = (picture[i].0 - y).abs();
+                let error = picture.errors[i];
+                let difference = (picture.pixels[i].0 - y).abs();
                 cell.pixels += 1.0;
                 cell.beyond_3 += f64::from(difference > 3.0 * error.hypot(v.sqrt()));
                 cell.squares.0 += difference.powi(2) - v;
                 cell.squares.1 += error * error;
             }
-            cell.own += truth.mean(|i, _| picture[i].1).powi(2) / f64::from(SEEDS);
-            let actual = truth.of(&picture);
-            cell.actual += actual.powi(2) / f64::from(SEEDS);
-            let error = film.relative_error();
+            let own = truth.mean(|i| picture.pixels[i].1);
+            let square = |i: usize| {
+                let (y, v) = truth.pixels[i];
+                (picture.pixels[i].0 - y).powi(2) - v
+            };
+            let actual = truth.mean(square);
+            let [samples, most] = [n, SAMPLES[most]].map(|n| n as f64);
+            cell.expected += of_most * most / samples / f64::from(SEEDS);
+            cell.own += own / f64::from(SEEDS);
+            cell.actual += actual / f64::from(SEEDS);
+            let error = picture.relative_error;
             cell.stated.push((
                 error.value.unwrap_or(0.0),
                 error.uncertainty.unwrap_or(0.0),
                 error.doubt.is_some(),
-                actual,
+                actual.max(0.0).sqrt(),
             ));
         }
     }
     for cell in &mut cells {
-        cell.actual = cell.actual.sqrt();
-        cell.own = cell.own.sqrt();
+        for square in [&mut cell.expected, &mut cell.own, &mut cell.actual] {
+            *square = square.max(0.0).sqrt();
+        }
     }
     cells
 }
@@ -168,67 +253,75 @@ impl Count {
     }
 }
 
-/// How the statements of many pictures turned out.
+/// How statements turned out, by some error that they were taken to be about.
 #[derive(Default)]
-struct Score {
-    /// How far the statements of the picture's row are off, and whether it is too small, or right to a tenth.
-    rows: Vec<(f64, bool, bool)>,
-    pictures: Count,
-    /// The expected error exceeds 1.2 times the stated one.
+struct Judged {
+    /// That error exceeds 1.2 times the stated one.
     too_small: Count,
     /// The stated error is right to a tenth.
     right: Count,
-    /// The same, and it is right to a tenth about the error that the picture itself has.
-    right_itself: Count,
+}
+
+impl Judged {
+    /// `errors`: that error, or several.
+    fn add(&mut self, errors: &[f64], stated: f64, doubted: bool) {
+        let all = |is: fn(f64) -> bool| errors.iter().all(|e| is(e / stated));
+        self.too_small.add(all(|r| r.is_nan() || r > 1.2), doubted);
+        self.right.add(all(|r| (r - 1.0).abs() <= 0.1), doubted);
+    }
+}
+
+impl fmt::Display for Judged {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (too_small, right) = (self.too_small, self.right);
+        write!(
+            f,
+            "too small in {}, and {} of these are in doubt; right to a tenth in {}, and {} of these are in doubt",
+            too_small.all,
+            too_small.share(),
+            right.all,
+            right.share(),
+        )
+    }
+}
+
+/// How the statements of many pictures turned out.
+#[derive(Default)]
+struct Score {
+    pictures: Count,
+    /// By the error that the picture itself has.
+    itself: Judged,
+    /// By the error that such pictures have: the root mean square.
+    expected: Judged,
+    /// By both.
+    both: Judged,
 }
 
 impl Score {
     fn add(&mut self, cell: &Cell) {
-        let truth = cell.expected.max(cell.own);
-        let squares = cell.stated.iter().map(|s| (s.0 / truth).ln().powi(2));
-        let off = (squares.sum::<f64>() / f64::from(SEEDS)).sqrt();
+        let expected = cell.expected.max(cell.own);
         for &(stated, _, doubted, actual) in &cell.stated {
-            let ratio = truth / stated;
-            let is_right = |ratio: f64| (ratio - 1.0).abs() <= 0.1;
-            let too_small = ratio.is_nan() || ratio > 1.2;
-            self.rows.push((off, too_small, is_right(ratio)));
             self.pictures.add(true, doubted);
-            self.too_small.add(too_small, doubted);
-            self.right.add(is_right(ratio), doubted);
-            let itself = is_right(ratio) && is_right(actual / stated);
-            self.right_itself.add(itself, doubted);
+            self.itself.add(&[actual], stated, doubted);
+            self.expected.add(&[expected], stated, doubted);
+            self.both.add(&[actual, expected], stated, doubted);
         }
-    }
-
-    /// The share of right statements that a rule would have to doubt which knew how far those of each row are off, in order to doubt 95 %
-    /// of what is too small.
-    fn least(&self) -> f64 {
-        let mut wrong: Vec<f64> = (self.rows.iter().filter(|r| r.1).map(|r| r.0)).collect();
-        wrong.sort_by(|a, b| b.total_cmp(a));
-        let last = wrong[(0.95 * wrong.len() as f64).ceil() as usize - 1];
-        let doubted = self.rows.iter().filter(|r| r.2 && r.0 >= last).count();
-        doubted as f64 / self.right.all as f64
     }
 
     fn print(&self, scenes: usize) {
         let undoubted = self.pictures.undoubted();
         let share = |of: Count| percent(of.undoubted() as f64 / undoubted.max(1) as f64);
         println!(
-            "{scenes} scenes, {} pictures. The error is above 1.2 times the stated one in {}; {} of these are in doubt. The stated \
-             error is right to a tenth in {}; {} of these are in doubt. In {} of these it is right about the error that the picture \
-             itself has, too; {} of these are in doubt. {undoubted} pictures are in no doubt: {} of these are right to a tenth, and in \
-             {} the error is above 1.2 times the stated one. A rule that knew how far the statements of each row are off would have to \
-             doubt {} of what is right in order to doubt 95 % of what is too small.",
+            "{scenes} scenes, {} pictures. The stated error is taken for too small if the true one is above 1.2 times as large. By the error \
+             that each picture has it is {}. By the error that such pictures have (root mean square) it is {}. By both it is {}. \
+             {undoubted} pictures are in no doubt: the stated error is right to a tenth in {} of these, and too small in {}, by the \
+             picture's own error.",
             self.pictures.all,
-            self.too_small.all,
-            self.too_small.share(),
-            self.right.all,
-            self.right.share(),
-            self.right_itself.all,
-            self.right_itself.share(),
-            share(self.right),
-            share(self.too_small),
-            percent(self.least()),
+            self.itself,
+            self.expected,
+            self.both,
+            share(self.itself.right),
+            share(self.itself.too_small),
         );
     }
 }
@@ -252,7 +345,7 @@ fn print_row(name: &str, samples: u64, cell: &Cell) {
 }
 
 #[test]
-#[ignore = "an hour"]
+#[ignore = "two hours and more"]
 fn the_table() {
     let mut scenes = folder("stated_error");
     scenes.extend(scene_files());
@@ -265,7 +358,8 @@ fn the_table() {
     let mut score = Score::default();
     for path in &scenes {
         let name = path.file_stem().expect("a name").to_string_lossy();
-        for (samples, cell) in SAMPLES.iter().zip(cells(path)) {
+        let size = if SLOW.contains(&&*name) { SMALL } else { SIZE };
+        for (samples, cell) in SAMPLES.iter().zip(cells(path, size, 1 << 16)) {
             print_row(&name, *samples, &cell);
             score.add(&cell);
         }
@@ -277,7 +371,7 @@ fn named(name: &str) -> Vec<Cell> {
     let path = folder("stated_error")
         .into_iter()
         .find(|p| p.ends_with(format!("{name}.toml")));
-    cells(&path.expect("the scene is there"))
+    cells(&path.expect("the scene is there"), SMALL, 1 << 16)
 }
 
 /// Light through a glass ball alone is sampled, so there is no doubt about it. Glass reflects a little of it, which is found more rarely.
@@ -303,7 +397,8 @@ fn a_lamp_in_a_glass_ball_lights_well() {
 }
 
 /// Of light that comes through a glass ball by other ways, few samples have found any. Most of the error is what the ball shows of it, which
-/// a picture without a find cannot state: so there is a doubt, and no more than a factor of three between the two.
+/// a picture without a find cannot state, such as six of eight at 16 samples: so there is a doubt, and no more than a factor of four between the
+/// two.
 #[test]
 fn a_lamp_near_the_edge_of_a_glass_ball_is_in_doubt() {
     for (samples, cell) in SAMPLES.iter().zip(named("bulb_edge")) {
@@ -317,7 +412,7 @@ fn a_lamp_near_the_edge_of_a_glass_ball_is_in_doubt() {
             .sum::<f64>()
             .sqrt();
         assert!(
-            (1.0 / 3.0..1.5).contains(&(stated / cell.expected)),
+            (0.25..1.5).contains(&(stated / cell.expected)),
             "{samples} samples"
         );
     }

@@ -26,7 +26,8 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     let mut progress = Progress::new(&args.talk);
     let steps = 1 + outputs.len();
     progress.step(0, steps, &args.film.display().to_string());
-    let (film, provenance) = store::load(&args.film)?;
+    let (film, mut provenance) = store::load(&args.film)?;
+    let error = provenance.describe(&film);
     if let Some(path) = &args.scene {
         let why = |no: NoScene| FileError::content(path, no.to_string());
         check_scene(&provenance, &parse::read(path)?).map_err(why)?;
@@ -87,7 +88,7 @@ pub fn develop(args: &DevelopArgs) -> Result<(), Failure> {
     if let (Some(path), Some(made)) = (&args.report, &made) {
         write_text(path, &made.report().to_json())?;
     }
-    warn_of_doubt(&provenance.error(&film));
+    warn_of_doubt(&error);
     written.end()
 }
 

@@ -222,7 +222,7 @@ fn render_before(
     // Save the film however the run ended. Write pictures only if the run did not fail, but even if the film could not be
     // saved: then they are the only result.
     stages.begin("looking at every pixel");
-    let provenance = saver.provenance(&film, &tally);
+    let (provenance, error) = saver.provenance(&film, &tally);
     let mut written = Written::default();
     if let Some(path) = args.film.as_ref().filter(|_| tally.counters.paths > 0) {
         stages.begin(format!("saving {}", path.display()));
@@ -280,8 +280,6 @@ fn render_before(
         let next = |_: usize, path: &Path| stages.begin(format!("writing {}", path.display()));
         write_pictures(&outputs, of, &args.pictures, beside, &mut written, next)?;
     }
-    stages.begin("looking at every pixel");
-    let error = provenance.error(&film);
     stages.end();
     events::emit(&ended_so(stop_reason(args, reason), &tally, &error), true);
     if let Some(path) = &args.report {

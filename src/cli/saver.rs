@@ -6,6 +6,7 @@ use crate::date::utc;
 use crate::engine::DeviceInfo;
 use crate::files::FileError;
 use crate::film::Film;
+use crate::film::error::RelativeError;
 use crate::output::store;
 use crate::output::write_png;
 use crate::provenance::Provenance;
@@ -58,8 +59,8 @@ impl<'a> Saver<'a> {
         }
     }
 
-    /// The film's provenance, including this run.
-    pub fn provenance(&self, film: &Film, tally: &Tally) -> Provenance {
+    /// The film's provenance, including this run, and its relative error.
+    pub fn provenance(&self, film: &Film, tally: &Tally) -> (Provenance, RelativeError) {
         render::provenance(self.before, self.device, film, tally)
     }
 
@@ -70,7 +71,8 @@ impl<'a> Saver<'a> {
             && let Some(path) = self.args.film.as_deref()
         {
             let began = Instant::now();
-            let saved = store::save(path, film, &self.provenance(film, tally));
+            let (provenance, _) = self.provenance(film, tally);
+            let saved = store::save(path, film, &provenance);
             self.checkpoint.done(began, saved, progress);
         }
         self.watch.interval = WATCH.max(self.watch.took * WATCH_SHARE);
@@ -78,7 +80,7 @@ impl<'a> Saver<'a> {
             && let Some(path) = self.args.watch.as_deref()
         {
             let began = Instant::now();
-            let provenance = self.provenance(film, tally);
+            let (provenance, _) = self.provenance(film, tally);
             let written = write_png(path, film, &provenance, self.args.pictures.exposure);
             self.watch.done(began, written, progress);
         }

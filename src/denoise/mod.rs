@@ -27,7 +27,7 @@ pub struct Task {
 }
 
 impl Task {
-    /// Prepares `film`, a picture of `view`. `done` hears how many rows of features are done.
+    /// Prepares `film`, a picture of `view`, which `provenance` describes. `done` hears how many rows of features are done.
     pub fn new(
         film: &Film,
         provenance: &Provenance,
@@ -42,7 +42,7 @@ impl Task {
             lamps: lamps.collect(),
             replicates,
             features,
-            doubt: provenance.error(film).doubt.map(|d| d.to_string()),
+            doubt: provenance.relative_error_doubt.clone(),
         })
     }
 

@@ -50,8 +50,8 @@ const OF_POOLS: f64 = 2.5;
 /// Σ c² / (Σ c)² of equally noisy pixels, times their number: s² of four replicates has the relative variance 2/3.
 const EVEN: f64 = 5.0 / 3.0;
 
-/// A pixel is unlit if there is no light within so many pixels of it, across and down.
-const AROUND: usize = 4;
+/// A pixel is unlit if there is no light within this share of the picture's longer side, across and down.
+const AROUND: f64 = 1.0 / 16.0;
 
 /// The largest share of unlit pixels that counts as chance.
 const MOST_UNLIT: f64 = 0.01;
@@ -59,7 +59,7 @@ const MOST_UNLIT: f64 = 0.01;
 /// If so many pixels have found light that mirrors and glass show, and that no light path brings, its error is known from them.
 const FEW_FOUND: f64 = 32.0;
 
-/// The largest squared error that missing light may bring, over the stated one, without a doubt.
+/// The largest squared error that light may bring which was not found, over the stated one, without a doubt.
 const MOST_MISSING: f64 = 1.0;
 
 /// The largest share of the picture that may be waiting for such light without a doubt.
@@ -200,11 +200,12 @@ impl Film {
         if single {
             uncertainty = 1.0;
         }
-        let unlit = self.unlit(&pixels) as f64 / count;
+        let most_missing = MOST_MISSING * value * value;
+        let [unlit, unfound] = self.unlit(&pixels, floor, count);
         let [hidden, missing] = self.hidden(&pixels, mean, count);
-        let doubt = if unlit > MOST_UNLIT {
+        let doubt = if unlit > MOST_UNLIT && unfound > most_missing {
             Some(Doubt::Unlit(unlit))
-        } else if hidden > MOST_HIDDEN && missing > MOST_MISSING * value * value {
+        } else if hidden > MOST_HIDDEN && missing > most_missing {
             Some(Doubt::Hidden(hidden))
         } else {
             (single || by_rare_light > MOST_UNCERTAIN).then_some(Doubt::Uncertain)
@@ -259,38 +260,55 @@ impl Film {
             return [0.0; 2];
         }
         let pixels = far(Reach::Hidden).count() as f64;
-        // If so many were found, so many more may be expected at most, of 20 such pictures in 19.
-        let more = 3.0 + 2.0 * found.sqrt();
-        let chance = more / samples;
         let light = MATT * splats.setup.scale;
-        let variance = chance * light * light * pixels / samples;
+        let variance = missed_chance(found, samples) * light * light * pixels / samples;
         let share = pixels / count;
         [share, share * variance / (mean * mean)]
     }
 
-    /// Pixels where paths have met surfaces beyond the first, but found no light, nor have the pixels around them.
-    fn unlit(&self, pixels: &[Light]) -> u64 {
+    /// The share of pixels where paths have met surfaces beyond the first, but found no light, nor have the pixels around them; and the
+    /// squared relative error that may be missing there, if light that was not found is as bright as the brightest that was.
+    fn unlit(&self, pixels: &[Light], floor: f64, count: f64) -> [f64; 2] {
         if self.reached.is_empty() {
-            return 0;
+            return [0.0; 2];
         }
+        let around = (AROUND * f64::from(self.size[0].max(self.size[1]))).ceil() as usize;
         let width = self.bounds.width() as usize;
-        let lit: Vec<bool> = pixels.iter().map(|p| p.sum > 0.0).collect();
-        // First along rows, then along columns.
-        let near = |k: usize, n: usize| k.saturating_sub(AROUND)..n.min(k + AROUND + 1);
-        let along: Vec<bool> = (0..lit.len())
-            .into_par_iter()
-            .map(|i| {
-                let row = i / width * width;
-                near(i % width, width).any(|x| lit[row + x])
-            })
-            .collect();
-        let height = lit.len() / width;
+        let height = pixels.len() / width;
+        // Lit pixels above and to the left of each corner.
+        let stride = width + 1;
+        let mut before = vec![0u32; stride * (height + 1)];
+        for (y, row) in pixels.chunks_exact(width).enumerate() {
+            let mut of_row = 0;
+            for (x, pixel) in row.iter().enumerate() {
+                of_row += u32::from(pixel.sum > 0.0);
+                before[(y + 1) * stride + x + 1] = before[y * stride + x + 1] + of_row;
+            }
+        }
+        let near = |k: usize, n: usize| [k.saturating_sub(around), n.min(k + around + 1)];
         let dark = |i: &usize| {
-            let (x, y) = (i % width, i / width);
+            let [left, right] = near(i % width, width);
+            let [top, bottom] = near(i / width, height).map(|y| y * stride);
             pixels[*i].n > 0.0
                 && self.reached[*i] >= Reach::Further as u8
-                && !near(y, height).any(|y| along[y * width + x])
+                && before[bottom + right] + before[top + left]
+                    == before[bottom + left] + before[top + right]
         };
-        (0..lit.len()).into_par_iter().filter(dark).count() as u64
+        let dark: Vec<usize> = (0..pixels.len()).into_par_iter().filter(dark).collect();
+        if dark.is_empty() {
+            return [0.0; 2];
+        }
+        let samples: f64 = dark.iter().map(|i| pixels[*i].n).sum();
+        let lit = pixels.iter().filter(|p| p.sum > 0.0);
+        let brightest = lit.map(|p| p.squares / p.sum).fold(0.0, f64::max);
+        let n = samples / dark.len() as f64;
+        let variance = missed_chance(0.0, samples) * brightest * brightest / n;
+        let share = dark.len() as f64 / count;
+        [share, share * variance / floor]
     }
+}
+
+/// The chance of a sample to find light that these samples may have missed, beside what they have found: at most, in 19 of 20 pictures.
+fn missed_chance(found: f64, samples: f64) -> f64 {
+    (3.0 + 2.0 * found.sqrt()) / samples
 }

@@ -178,13 +178,12 @@ pub struct Run<'a> {
 }
 
 impl Report {
-    /// The report of `run`, which produced `film`.
+    /// The report of `run`, which produced `film`, as `provenance` describes it.
     pub fn new(run: Run, film: &Film, provenance: &Provenance) -> Self {
         let rate = |count: u64| {
             let seconds = run.seconds.render;
             (seconds > 0.0).then(|| count as f64 / seconds)
         };
-        let error = provenance.error(film);
         let pixels: u64 = film.coverage.cells().map(|c| c.0.area()).sum();
         Self {
             version: provenance.version.clone(),
@@ -210,9 +209,9 @@ impl Report {
             rays: run.counters.rays,
             paths_per_second: rate(run.counters.paths),
             rays_per_second: rate(run.counters.rays),
-            relative_error: error.value,
-            relative_error_uncertainty: error.uncertainty,
-            relative_error_doubt: error.doubt.map(|d| d.to_string()),
+            relative_error: provenance.relative_error,
+            relative_error_uncertainty: provenance.relative_error_uncertainty,
+            relative_error_doubt: provenance.relative_error_doubt.clone(),
             mean_luminance: film.mean_luminance(),
             truncated_paths: run.counters.truncated,
             nonfinite_samples: run.counters.nonfinite,
@@ -279,7 +278,9 @@ mod tests {
                 first_nonfinite: None,
             },
         };
-        serde_json::from_str(&Report::new(run, film, &example(film.size)).to_json()).unwrap()
+        let mut provenance = example(film.size);
+        provenance.describe(film);
+        serde_json::from_str(&Report::new(run, film, &provenance).to_json()).unwrap()
     }
 
     #[test]

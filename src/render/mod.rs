@@ -309,17 +309,17 @@ pub fn render_with(
     renderer::render(None, None, scene, options, watch)
 }
 
-/// The provenance of `film`, which a run on `device` has brought on from `before`.
+/// The provenance of `film`, which a run on `device` has brought on from `before`, and the film's relative error.
 pub fn provenance(
     before: &Provenance,
     device: &DeviceInfo,
     film: &Film,
     tally: &Tally,
-) -> Provenance {
+) -> (Provenance, RelativeError) {
     let mut provenance = before.clone();
     provenance.add_work(device, tally.counters, tally.seconds);
-    provenance.describe(film);
-    provenance
+    let error = provenance.describe(film);
+    (provenance, error)
 }
 
 #[cfg(test)]

@@ -201,7 +201,7 @@ pub(super) fn render(
         // It has ended already, whatever the answer is.
         let _ = watch(&Progress { film, tally, black });
     }
-    let provenance = provenance(&before, &device, &film, &tally);
+    let (provenance, _) = provenance(&before, &device, &film, &tally);
     Ok(Picture::new(film, provenance, Some(ended), chosen.note))
 }
 

@@ -57,7 +57,7 @@ impl Snapshot {
     pub fn provenance(&self) -> Cow<'_, Provenance> {
         match &self.work {
             Some((device, tally)) => {
-                Cow::Owned(render::provenance(&self.before, device, &self.film, tally))
+                Cow::Owned(render::provenance(&self.before, device, &self.film, tally).0)
             }
             None => Cow::Borrowed(&self.before),
         }

@@ -249,11 +249,33 @@ fn surfaces_that_no_light_was_found_on_are_told_from_a_background() {
             film.reach(x, y, Reach::Further);
         }
     }
-    // 24 columns but for the corner and what is within four pixels of it.
-    let share = (24.0 * 36.0 - 16.0 * 16.0) / PIXELS;
+    // 24 columns but for the corner and what is within a sixteenth of 48 pixels of it.
+    let share = (24.0 * 36.0 - 15.0 * 15.0) / PIXELS;
     let error = film.relative_error();
     assert_eq!(error.doubt, Some(Doubt::Unlit(share)));
     assert_eq!(error.upper(), None);
+}
+
+/// A third of the picture shines. Elsewhere no sample has found light: if three of them might have found some that is as bright as the
+/// brightest, it would change the error, or not.
+#[test]
+fn surfaces_without_light_are_in_no_doubt_once_it_would_not_matter() {
+    let doubt = |lamp: f64| {
+        let source = |x: u32, y: u32| Source {
+            base: if (x, y) == (0, 0) { lamp } else { 0.0 },
+            flash: if x < 16 { 2.0 } else { 0.0 },
+            chance: 0.5,
+        };
+        let mut film = simulated(source, 1);
+        for k in 0..SIZE[0] * SIZE[1] {
+            film.reach(k % SIZE[0], k / SIZE[0], Reach::Further);
+        }
+        film.relative_error().doubt
+    };
+    // E² is 1/3 / 64 = 0.0052. The mean is 1/3, so the missing part is 3 x 2² / 1728 / 64² / (1/30)² = 0.0015, and 0.14 with a lamp of 20.
+    assert_eq!(doubt(0.0), None);
+    let share = 29.0 / 48.0;
+    assert_eq!(doubt(20.0), Some(Doubt::Unlit(share)));
 }
 
 /// Mirrors and glass show surfaces in a corner of the picture. Light that comes there by way of mirrors and glass may be as bright as the
