@@ -23,6 +23,8 @@ const SLOW: [&str; 4] = ["barth", "density", "gyroid", "peptide"];
 const SMALL: [u32; 2] = [64, 48];
 const SAMPLES: [u64; 4] = [16, 64, 256, 1024];
 const SEEDS: u32 = 8;
+/// Samples of a reference, and its seed, which is none of the pictures'.
+const REFERENCE: (u64, u32) = (1 << 16, 77);
 /// A pixel's light is known once its square is so many times its squared standard error.
 const KNOWN: f64 = 64.0;
 
@@ -94,11 +96,10 @@ struct Reference {
 }
 
 impl Reference {
-    /// Its seed is none of the pictures'.
-    fn new(path: &Path, samples: u64) -> Self {
+    fn new(path: &Path) -> Self {
         let scene = read(path);
-        let settings = settings(&scene, SMALL, 77);
-        let film = film(&mut gpu(&scene, &settings, None), &settings, samples);
+        let settings = settings(&scene, SMALL, REFERENCE.1);
+        let film = film(&mut gpu(&scene, &settings, None), &settings, REFERENCE.0);
         let mut light = vec![0.0; film.sums().len()];
         film.for_each(|x, y, e| light[film.index(x, y)] = luminance(e.mean));
         Self {
@@ -182,8 +183,8 @@ struct Cell {
     squares: (f64, f64),
 }
 
-fn cells(path: &Path, size: [u32; 2], reference: u64) -> Vec<Cell> {
-    let reference = Reference::new(path, reference);
+fn cells(path: &Path, size: [u32; 2]) -> Vec<Cell> {
+    let reference = Reference::new(path);
     let pictures = render(path, size);
     let most = SAMPLES.len() - 1;
     let longest: Vec<&Picture> = pictures.iter().map(|p| &p[most]).collect();
@@ -359,7 +360,7 @@ fn the_table() {
     for path in &scenes {
         let name = path.file_stem().expect("a name").to_string_lossy();
         let size = if SLOW.contains(&&*name) { SMALL } else { SIZE };
-        for (samples, cell) in SAMPLES.iter().zip(cells(path, size, 1 << 16)) {
+        for (samples, cell) in SAMPLES.iter().zip(cells(path, size)) {
             print_row(&name, *samples, &cell);
             score.add(&cell);
         }
@@ -371,7 +372,7 @@ fn named(name: &str) -> Vec<Cell> {
     let path = folder("stated_error")
         .into_iter()
         .find(|p| p.ends_with(format!("{name}.toml")));
-    cells(&path.expect("the scene is there"), SMALL, 1 << 16)
+    cells(&path.expect("the scene is there"), SMALL)
 }
 
 /// Light through a glass ball alone is sampled, so there is no doubt about it. Glass reflects a little of it, which is found more rarely.
